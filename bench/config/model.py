@@ -27,7 +27,6 @@ _BLOCKS_OF_HEARTBEAT = 4
 _SHORTEST_WITH_SERIAL_LASERS = 0.02
 """Shortest block with serial lasers, whose values arrive in bursts of a few milliseconds [s]."""
 
-
 _TABLES: dict[str, Literal["simulation", "hardware"]] = {"simulated": "simulation", "hardware": "hardware"}
 """Configuration tables of the built-in backends; any other backend uses `rig`."""
 
@@ -184,8 +183,7 @@ class BenchConfiguration(Parameters):
     @property
     def laser_half_ranges(self) -> tuple[float, float]:
         """Largest displacement from mid range that the lasers on the first and the second storey can measure [m]."""
-        first, second = self.laser_ranges
-        return 0.5 * first, 0.5 * second
+        return 0.5 * self.laser_ranges[0], 0.5 * self.laser_ranges[1]
 
     def at_pace(self, *, realtime: bool) -> "BenchConfiguration":
         """The configuration with a value for every setting whose default depends on whether time is virtual or real."""
@@ -245,9 +243,14 @@ class BenchConfiguration(Parameters):
         return self
 
     @model_validator(mode="after")
+    def _a_file_or_its_content(self) -> "BenchConfiguration":
+        for file, content in (("specimen_file", "identified"), ("laser_calibration", "calibrated")):
+            if None not in (path := getattr(self, file), getattr(self, content)):
+                raise InvalidInput(file, path, f"{content} is also present; remove one of them")
+        return self
+
+    @model_validator(mode="after")
     def _what_is_identified_can_be(self) -> "BenchConfiguration":
-        if self.specimen_file is not None and self.identified is not None:
-            raise InvalidInput("specimen_file", self.specimen_file, "identified is also present; remove one of them")
         try:
             _ = self.known_specimen
         except InvalidInput as refusal:
@@ -262,9 +265,8 @@ class BenchConfiguration(Parameters):
         for number, channel in enumerate(self.channels):
             item = f"channels[{number}]"
             if channel.name in names:
-                raise InvalidInput(
-                    f"{item}.name", channel.name, "another channel has this name; choose a different one"
-                )
+                allowed = "another channel has this name; choose a different one"
+                raise InvalidInput(f"{item}.name", channel.name, allowed)
             names.add(channel.name)
             if self.backend == "simulated":
                 try:
@@ -275,13 +277,6 @@ class BenchConfiguration(Parameters):
                 continue
             if (other := terminals.setdefault(channel.terminal.lower(), channel.name)) != channel.name:
                 raise InvalidInput(f"{item}.terminal", channel.terminal, f"{other} already uses this terminal")
-        return self
-
-    @model_validator(mode="after")
-    def _one_calibration(self) -> "BenchConfiguration":
-        if self.laser_calibration is not None and self.calibrated is not None:
-            allowed = "calibrated is also present; remove one of them"
-            raise InvalidInput("laser_calibration", self.laser_calibration, allowed)
         return self
 
     @model_validator(mode="after")

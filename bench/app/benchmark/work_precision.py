@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.app.benchmark.section import Cell, Column, Section, Target, in_turn, once
-from bench.comparators.case import DURATION, IMPACTS, SPECIMEN, START, drive, error_of, peak_error_of
+from bench.comparators.case import AMPLITUDE, DURATION, IMPACTS, SPECIMEN, START, drive, error_of, peak_error_of
 from bench.comparators.catalogue import LAST_PERIODS, SOLVERS, solve, steady_gain_by_time
 from bench.comparators.problem import Problem
 from bench.comparators.scipy_events import METHODS, integrate, python_rates
@@ -137,8 +137,6 @@ def _cvode(tolerance: float) -> Method:
 
 POINTS = ((17.5, 0.40), (16.0, 0.97))
 """Omega [rad/s] and beta: point C of the paper, and a point with small alpha_2."""
-
-AMPLITUDE = 1.01 * 9.81 / 8.0
 
 GAIN_COLUMNS = (
     Column("omega", "Omega [rad/s]", "g"),

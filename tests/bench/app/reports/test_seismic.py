@@ -11,7 +11,8 @@ import pytest
 from bench.analysis.signals import ACCELERATION, SignalMap
 from bench.app.catalogue import load_protocol
 from bench.app.cli.main import main
-from bench.app.reports.report import campaign_report, damage_notice, limits_section
+from bench.app.reports.limits import limits_section
+from bench.app.reports.report import campaign_report, damage_notice
 from bench.config.model import BenchConfiguration
 from bench.config.sections import Acquisition, Simulation
 from bench.datafile.reader import open_datafile
