@@ -48,9 +48,7 @@ def make_folder(first: Path, taken: Container[Path] = ()) -> Path:
         except OSError as error:
             raise InvalidInput("--out", str(folder), f"the folder cannot be created: {error.strerror}") from None
         break
-    raise InvalidInput(
-        "--out", str(first), f"{first.parent} is repeatedly removed by another program; choose another folder"
-    )
+    raise InvalidInput("--out", str(first), f"another program repeatedly removes {first.parent}; choose another folder")
 
 
 def _make_parent(folder: Path) -> None:
@@ -61,7 +59,7 @@ def _make_parent(folder: Path) -> None:
 
 
 def remove_unused(folder: Path) -> None:
-    """Remove a folder created by `make_folder`, and its parent, if they are empty."""
+    """Remove a folder created by `make_folder` if it is empty, and then its parent if that is empty."""
     with suppress(OSError):
         folder.rmdir()
         folder.parent.rmdir()
@@ -76,7 +74,11 @@ def check_folder(folder: Path, results: Iterable[str]) -> None:
     try:
         for name in results:
             if (folder / name).exists():
-                raise InvalidInput("--out", str(folder), f"it already contains {name}; results are never overwritten")
+                raise InvalidInput(
+                    "--out",
+                    str(folder),
+                    f"it already contains {name}; results are never overwritten, so choose another folder",
+                )
         while not existing.exists() and existing != existing.parent:
             existing = existing.parent
         if not existing.is_dir():

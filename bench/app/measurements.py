@@ -78,8 +78,8 @@ class Samples(Quantity):
 
 @dataclass(frozen=True)
 class Run:
-    """The samples from arming to stopping the rig, `start` to `stop` [s] of bench time. `beta` is the label of the
-    mounted spring, None for the bare frame.
+    """The samples from the arming of the rig at bench time `start` to its stop at `stop` [s]. `beta` is the label of
+    the mounted spring, None for the bare frame.
     """
 
     number: int
@@ -90,7 +90,7 @@ class Run:
 
 class Campaign:
     """The data file of a campaign: finished, interrupted, or still being written. Use it in a `with` statement. Data
-    are read on access; `refresh` includes what has since been written to a file that is being written.
+    are read on access; `refresh` includes data that were written to the file after it was opened.
     """
 
     def __init__(self, path: str | PathLike[str]) -> None:
@@ -208,7 +208,7 @@ class Campaign:
         valid value. Raises InvalidInput for an unknown signal or run.
         """
         if signal not in self.signals:
-            raise InvalidInput("signal", signal, f"one of {', '.join(self.signals)}")
+            raise InvalidInput("signal", signal, f"it must be one of {', '.join(self.signals)}")
         if run is not None and run not in [each.number for each in self.runs]:
             raise InvalidInput("run", run, f"the file contains runs 1 to {len(self.runs)}")
         times, values = [np.empty(0)], [np.empty(0)]

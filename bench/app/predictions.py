@@ -39,7 +39,7 @@ Record = File | Accelerogram | tuple[NDArray[Any], float]
 """A file, `FILE@unit=g`, `synthetic:NAME`, or acceleration [m/s2] and time step [s]."""
 
 OF_SINE = ("amplitude_factor", "members")
-"""Options of a prediction for a sine."""
+"""Names of the options of a prediction for a sine."""
 
 _OF_BRANCH = {
     "alpha_1": ("alpha_1", "1"),
@@ -261,7 +261,7 @@ def _places(values: NDArray[np.float64], axis: Sequence[float]) -> NDArray[np.in
 
 
 def _index(given: Any) -> int | slice:
-    """Index of an axis: 0 for a single number, which drops the axis; else the whole axis."""
+    """Index into an axis: 0 for a single number, which drops the axis; else the whole axis."""
     return 0 if np.ndim(given) == 0 and not isinstance(given, str) else slice(None)
 
 

@@ -26,10 +26,10 @@ from sim.loading import BENCH, load_model
 from sim.parameters import Parameters
 
 SPARE = 3.0
-"""Factor on the expected duration: every start may fail, and every motion may settle slowly."""
+"""Factor by which a run may exceed its expected duration: every start may fail, and every motion may settle slowly."""
 
 OVERHEAD = 1.1
-"""Factor for everything but the samples: blocks, events, estimates, tables, and the overhead of the format."""
+"""Factor for contents other than samples: blocks, events, estimates, tables, and the overhead of the format."""
 
 DRIVE_BYTES = 4
 """Bytes per drive sample in the file."""
@@ -118,9 +118,13 @@ def _rounded(value: Any) -> Any:
 
 @dataclass(frozen=True)
 class Preflight:
-    """Result of the check. `margins` are in ascending order; `room` is None if the run's duration is unknown; `sensors`
-    holds warnings about sensor calibrations, `reviewed` the cross-checks of configuration and parameters, and `scales`
-    the frequencies in both units.
+    """Result of the check.
+
+    margins : margin to each limit, in ascending order.
+    room : disk space; None if the duration of the run is unknown.
+    sensors : warnings about sensor calibrations.
+    reviewed : cross-checks of configuration and parameters.
+    scales : notes that state each frequency in both units.
     """
 
     forecast: Forecast

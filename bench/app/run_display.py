@@ -17,7 +17,7 @@ NOTICES = 5
 
 @dataclass(frozen=True)
 class Notice:
-    """A line of the log: `kind` is a word, `grave` marks a line that needs the operator's attention."""
+    """A line of the log; `kind` is one word, and `grave` is True for a line that needs the operator's attention."""
 
     time: float
     kind: str
@@ -150,8 +150,12 @@ def _share(value: float) -> str:
 
 @dataclass
 class RunDisplay:
-    """The displayed state: `rows` of finished points, the latest `notices` about other events, state, step and
-    progress. `live` has the live values of the protocol, one line each, by label.
+    """The displayed state of a run.
+
+    rows, running : points that are finished, and the point in progress.
+    twin : latest line on the live twin.
+    live : live values of the protocol, one line each, by label.
+    notices : latest log lines about other events.
     """
 
     time: float = 0.0
@@ -181,8 +185,8 @@ class RunDisplay:
         self._told, self.preparing = self.time, True
 
     def expect(self, duration: float | None) -> None:
-        """Show the `duration` [s] of the plan, None if unknown, once the rig is open and until the run reports its
-        progress.
+        """Show the `duration` of the plan [s], None if unknown. It is shown from the opening of the rig until the run
+        reports its progress.
         """
         self.fraction, self.remaining, self.preparing = 0.0, nan if duration is None else duration, False
         self.reason, self._told = "", self.time

@@ -33,8 +33,13 @@ from sim.parameters import Parameters
 
 @dataclass(frozen=True)
 class SessionResult:
-    """Result of a campaign. `summary` can be converted to JSON; `table` is text for the terminal. `passed` is the
-    verdict of a protocol that tests the bench, and True for any other protocol.
+    """Result of a campaign.
+
+    summary : contents of the summary file, which can be converted to JSON.
+    table : text for the terminal.
+    interrupted : whether a person or a client ended the campaign.
+    passed : verdict of a protocol that tests the bench; True for any other protocol.
+    cause : cause of the end.
     """
 
     status: str

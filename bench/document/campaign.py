@@ -17,7 +17,7 @@ from sim.parameters import Parameters
 from sim.specimen import Specimen
 
 AMPLITUDE_FACTOR = 1.01
-"""A_s over g/lambda in the paper (Eq. 11)."""
+"""Amplitude A_s of the sine over g/lambda in the paper (Eq. 11)."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Column:
-    """A table column: its heading, its unit ("" for text and pure numbers), and whether it contains words."""
+    """A table column: title, unit ("" for text and pure numbers), and whether it contains words."""
 
     title: str
     unit: str = ""
@@ -18,7 +18,7 @@ class Column:
 
     @property
     def heading(self) -> str:
-        """The title with the unit."""
+        """The title with the unit in brackets."""
         return f"{self.title} [{self.unit}]" if self.unit else self.title
 
 

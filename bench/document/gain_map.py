@@ -14,7 +14,9 @@ from sim.specimen import Specimen
 
 LOW, HIGH, STEP = 12.0, 21.0, 0.1
 BETA_LOW, BETA_HIGH, BETA_STEP = 0.1, 1.2, 0.02
-"""Frequencies [rad/s] and stiffness ratios of a map; measured points beyond them extend it."""
+"""Ranges and steps of the frequencies [rad/s] and of the stiffness ratios of a map; measured points outside extend the
+ranges.
+"""
 
 MOST = 20_000
 """Largest number of points of a map."""
@@ -55,8 +57,8 @@ def map_section(specimen: Specimen, amplitude_factor: float, measured: Sequence[
 
 
 def _axis(low: float, high: float, step: float, places: Sequence[float], margin: float) -> tuple[float, ...]:
-    """Equally spaced values over the range `low` to `high`, extended to include the measured `places`; the step is
-    larger than `step` if there would be too many values.
+    """Equally spaced values over the range `low` to `high`, extended to include the measured `places` with a `margin`.
+    The spacing exceeds `step` if the values would be too many.
     """
     least = min([low, *(place - margin for place in places if place < low)])
     most = max([high, *(place + margin for place in places if place > high)])

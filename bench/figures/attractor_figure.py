@@ -17,9 +17,11 @@ COLUMNS = 2
 
 
 def attractor_figure(points: Mapping[str, NDArray[Any]], gains: Sequence[NDArray[np.float64]]) -> "Figure":
-    """`points` are the arrays of the table from `bench.prediction.attractors`; `gains` are those of the last cycles for
-    each of its rows, empty after a fall. A dot is the peak of a cycle; the line is the orbit, dashed where it is
-    unstable on the shake table.
+    """Gains of long-term motions against frequency. A dot is the peak of a cycle; the line is the orbit, dashed where
+    it is unstable on the shake table.
+
+    `points` are the arrays of the table from `bench.prediction.attractors`; `gains` are those of the last cycles for
+    each of its rows, empty after a fall.
     """
     betas = np.unique(points["beta"])
     across = min(COLUMNS, betas.size)

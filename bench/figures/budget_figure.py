@@ -18,8 +18,9 @@ def budget_figure(
     expanded: Sequence[float],
     quantity: str = "expanded uncertainty of α₂",
 ) -> "Figure":
-    """Horizontal bars, each divided in proportion to the contributions to the variance. `budgets` are standard
-    uncertainties by contribution, `expanded` the lengths of the bars [%].
+    """Horizontal bars, each divided in proportion to the contributions to the variance.
+
+    `budgets` are the standard uncertainties of each bar by contribution; `expanded` are the lengths of the bars [%].
     """
     total = {name: sum(budget.get(name, 0.0) ** 2 for budget in budgets) for budget in budgets for name in budget}
     figure = new_figure(6.8, 1.2 + 0.22 * len(labels))

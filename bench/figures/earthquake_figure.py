@@ -34,8 +34,8 @@ HISTORY_HEADROOM = 1.1
 
 @dataclass(frozen=True, eq=False)
 class MotionPicture:
-    """Acceleration of the table [m/s2] under a record, every `dt` [s]: as requested, and as achieved with the bare
-    frame.
+    """Acceleration of the table [m/s2] under a record, at intervals of `dt` [s]: as requested, and as achieved with the
+    bare frame.
     """
 
     name: str
@@ -46,7 +46,7 @@ class MotionPicture:
 
 @dataclass(frozen=True, eq=False)
 class DriftPicture:
-    """Drift [m] under one record, every `dt` [s], measured and predicted; `beta` is None for the bare frame."""
+    """Measured and predicted drift [m] under one record at intervals of `dt` [s]; `beta` is None for the bare frame."""
 
     name: str
     beta: float | None

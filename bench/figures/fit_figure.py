@@ -21,13 +21,13 @@ LINES = ((BLUE, "-", 1.4), (VERMILLION, "--", 1.0), (BLACK, ":", 1.0), (GREEN, "
 POWERS = str.maketrans({"2": "²", "3": "³"})
 
 PREFIXED = {"m": ((1e-3, "µm", 1e6), (1.0, "mm", 1e3)), "rad": ((1.0, "mrad", 1e3),)}
-"""For each unit: upper limit of the values, prefixed unit, and factor."""
+"""For each unit: upper limits of the values, with the prefixed unit and the factor that apply below each."""
 
 APART = 8.0
-"""Largest ratio of a panel's span to the span of any of its columns."""
+"""Largest ratio of a panel's span to the span of any column in the panel."""
 
 UNCERTAINTY, COVERAGE = "_uncertainty", 2.0
-"""Suffix of columns that are drawn as error bars of others, and the coverage factor."""
+"""Suffix of the columns that are drawn as error bars of other columns, and the coverage factor of the bars."""
 
 
 def fit_figure(fit: FitFinished) -> "Figure":

@@ -20,9 +20,11 @@ WIDTH, ROW, MARGIN = 9.0, 2.0, 0.9
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """A motion. `values` has time_s, drift_m, bare_drift_m, u1_m and theta_rad, each shape (n,), NaN after a fall.
+    """A motion and its time histories.
 
-    `name` describes the start or the steady motion, `status` the end.
+    name : start of the motion, or kind of steady motion.
+    status : end of the motion.
+    values : time_s, drift_m, bare_drift_m, u1_m and theta_rad, each of shape (n,); NaN after a fall.
     """
 
     omega: float

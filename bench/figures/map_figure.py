@@ -30,7 +30,7 @@ GAINING, LOSING = "#DCEBF5", "#B9B9B9"
 """Colours of the gain: light where the block reduces the response, dark where it does not."""
 
 FEWEST_LEVELS = 4
-"""Least number of usual levels that a gain must cross; otherwise other levels are drawn."""
+"""Least number of usual contour levels that a gain must cross; if it crosses fewer, other levels are drawn."""
 
 JUMP = 0.1
 """Step in the frequency of least gain, as a fraction of the range, above which it counts as a jump between valleys."""
@@ -43,16 +43,17 @@ MARK: Mapping[str, Any] = {
     "markeredgecolor": BLUE,
     "markeredgewidth": 1.6,
 }
-"""Styles of measured points: marker with a gain, marker without a gain, common properties."""
+"""Styles of measured points: marker of a point with a gain, marker of a point without a gain, common properties."""
 
 SYMBOLS = {"alpha_1": r"$\alpha_1$", "alpha_2": r"$\alpha_2$"}
 
 
 @dataclass(frozen=True, eq=False)
 class BranchGrid:
-    """Branch of steady motion over the grid of n stiffnesses by m frequencies; NaN where it does not exist.
+    """Branch of steady motions over the grid of n stiffnesses by m frequencies; NaN where the motion does not exist.
 
-    `gains`: alpha_1 and alpha_2 by name, each shape (n, m). `multiplier`: greatest |Floquet multiplier|, shape (n, m).
+    gains : alpha_1 and alpha_2 by name, each of shape (n, m).
+    multiplier : greatest |Floquet multiplier|, shape (n, m).
     """
 
     gains: Mapping[str, Floats]

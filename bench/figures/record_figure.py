@@ -48,7 +48,8 @@ FIT_COLOURS = (GREY, BLUE, VERMILLION)
 
 @dataclass(frozen=True, eq=False)
 class RecordPicture:
-    """A record: `acceleration` [m/s2], `velocity` [m/s] and `displacement` [m], shape (n,), every `dt` [s].
+    """A record: `acceleration` [m/s2], `velocity` [m/s] and `displacement` [m], each of shape (n,), at intervals of
+    `dt` [s].
 
     `spectrum` is the pseudo-acceleration [m/s2] at `periods` [s] of oscillators with the damping ratio `damping`.
     """
@@ -76,7 +77,7 @@ class History:
 
 @dataclass(frozen=True, eq=False)
 class Spectra:
-    """Pseudo-accelerations [m/s2] at `periods` [s], one array for each history.
+    """Response spectra: pseudo-accelerations [m/s2] at `periods` [s], one array for each history.
 
     `own` contains the natural periods [s] of the frame, drawn as marks.
     """

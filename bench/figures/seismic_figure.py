@@ -33,13 +33,13 @@ DRIFT_WIDTH, DRIFT_ROW, MARGIN = 7.5, 1.25, 0.9
 """Width of the figure, height per record, height of legend and axis [inch]."""
 
 WIDTH, HEIGHT, ROW = 7.5, 6.4, 0.16
-"""Width, height without the strip of toppled blocks, height per record in the strip [inch]."""
+"""Width of the figure, its height without the strip of toppled blocks, and height of the strip per record [inch]."""
 
 DASHES = ("-", "--", "-.", ":")
 BAND_SHADE = 0.15
 
 LETTERS = 100
-"""Length of a legend line in characters; the sample of the curve takes eight of them."""
+"""Length of a legend line [characters]; the sample of the curve takes eight."""
 
 PANELS, PANELS_WIDTH, PANEL_HEIGHT = 3, 9.5, 2.5
 """Panels per row; width of the figure and height of a row [inch]."""
@@ -78,7 +78,8 @@ class GainCurve:
 
 @dataclass(frozen=True, eq=False)
 class BandCurve:
-    """alpha_2 against the lower `corner` [Hz] of the band for one record and stiffness, each shape (n,), ascending.
+    """alpha_2 for one record and stiffness against the lower end of the band, `corner` [Hz], ascending; each of shape
+    (n,).
 
     NaN where the run ended early; `toppled` is True where the block fell.
     """

@@ -44,7 +44,9 @@ LEGEND = (
 
 HEADROOM = 1.35
 FLOOR, CEILING = 0.01, 20.0
-"""Limits beyond which predicted gains do not extend the axis: no bench can distinguish them from 0 or a resonance."""
+"""Limits beyond which predicted gains do not extend the axis: no bench can distinguish such gains from 0 or from a
+resonance.
+"""
 
 Prediction = Mapping[str, NDArray[Any]]
 """Arrays of equal length: omega [rad/s], beta, alpha_2, stable (Booleans), layer (branch: "rocking" or "resting"), and

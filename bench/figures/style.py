@@ -30,10 +30,10 @@ MARKERS = "osD^v<>"
 """Colours and markers of the curves of a panel, in order."""
 
 HEADROOM = 1.12
-"""Ratio of the axis limit to the largest value."""
+"""Ratio of the axis limit to the largest drawn value."""
 
 MILLI = 1e3
-"""Factor from m and rad to the drawn mm and mrad."""
+"""Factor from m to mm and from rad to mrad, the drawn units."""
 
 
 def new_figure(width: float, height: float) -> "Figure":

@@ -12,7 +12,7 @@ from bench.unfinished import write_new
 from sim.parameters import Parameters
 
 PointLike = Parameters | Mapping[str, Any]
-"""Point, or its fields as returned by `bench.datafile.reader`."""
+"""A point, or its fields as returned by `bench.datafile.reader`."""
 
 
 def plain(points: Sequence[PointLike]) -> list[dict[str, Any]]:
@@ -23,10 +23,11 @@ def plain(points: Sequence[PointLike]) -> list[dict[str, Any]]:
 
 @dataclass(frozen=True)
 class Summary:
-    """Contents of the summary. Times are in seconds: `elapsed` by the wall clock, `bench_time` by the bench's clock.
+    """Contents of the summary.
 
-    `plan_hash` is the hash from the preflight (docs/preflight.md). `findings` are the protocol's conclusions from its
-    points.
+    elapsed, bench_time : duration by the wall clock and by the bench's clock [s].
+    plan_hash : hash from the preflight (docs/preflight.md).
+    findings : the protocol's conclusions from its points.
     """
 
     protocol: str

@@ -1,6 +1,7 @@
-"""Benchmarks of gain maps, by periodic orbits and by runs of 120 s, and of sampled records.
+"""Benchmarks of gain maps, computed from periodic orbits and from runs of 120 s, and of sampled records.
 
-In the record cases, the block stays at rest, rocks throughout, or has scattered parameters.
+There are three cases of records: a block that stays at rest, one that rocks throughout, and an ensemble with scattered
+parameters.
 """
 
 from math import pi
@@ -36,8 +37,8 @@ MAP_COLUMNS = (
 
 
 def gain_maps(n: int, runs: int, repetitions: int) -> Section:
-    """Time the map of n x n points, and 120 s runs that start on the orbit at `runs` x `runs` of these points; the time
-    of the runs is scaled to all points.
+    """Time the map of `n` x `n` points, and runs of 120 s at `runs` x `runs` of these points; the time of the runs is
+    scaled to all points.
     """
     betas, omegas = np.linspace(*BETAS, n), np.linspace(*OMEGAS, n)
     specimen = Specimen()
@@ -57,7 +58,7 @@ def gain_maps(n: int, runs: int, repetitions: int) -> Section:
             "per_point_ms": 1e3 * elapsed / points,
         },
         {
-            "how": "120 s runs from rest",
+            "how": "120 s runs",
             "points": ran,
             "found": sum(_settled(chart, chosen, k, motion) for k, motion in enumerate(motions)),
             "error": None,
@@ -101,7 +102,7 @@ def _settled(chart: GainMap, chosen: np.ndarray, k: int, motion: Motion) -> bool
 
 
 def _map_error(chart: GainMap) -> float:
-    """Greatest relative error of the peaks at nine points, by another integrator over one period."""
+    """Greatest relative error of the peaks at nine points; the reference is another integrator over one period."""
     worst = 0.0
     rows, columns = chart.betas.size, chart.omegas.size
     for i in {0, rows // 2, rows - 1}:

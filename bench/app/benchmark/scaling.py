@@ -183,11 +183,11 @@ def streaming(duration: float, repetitions: int, drives: Sequence[int] = (1_000,
     fastest = rows[0]["times_real_time"]
     notes = (
         f"{RATE} states per second, blocks of {1e3 * BLOCK:g} ms, with peaks, block rocking throughout. The target "
-        "applies to the first row: between two updates of the drive the motion is smooth.",
+        "applies to the first row. Between two updates of the drive, the motion is smooth.",
         "Error of the end state in SI units against dop853 at 1e-13.",
     )
     share = 200.0 / fastest if isinstance(fastest, float) else None
-    targets = (Target("streaming: 200 divided by the multiple of real time", 1.0, share, "1"),)
+    targets = (Target("streaming: 200 divided by the speed in multiples of real time", 1.0, share, "1"),)
     return Section("streaming", "Streaming", STREAMING_COLUMNS, rows, notes, targets)
 
 

@@ -39,7 +39,7 @@ STYLES: dict[str, tuple[str, str, Any]] = {
     "scipy LSODA": (ORANGE, "^", (0, (1, 1))),
     "scipy Radau": (SKY, "v", (0, (4, 1.5))),
 }
-"""Colour, marker and dashes of each method; further methods have grey points."""
+"""Colour, marker and dashes of each method; all other methods have grey points."""
 
 
 def work_precision_figure(section: Section) -> "Figure":
@@ -89,7 +89,7 @@ def machine() -> dict[str, str]:
 
 
 def versions() -> dict[str, str]:
-    """Versions of the software and of the installed libraries for comparison."""
+    """Versions of the software and of the installed comparison libraries."""
     return software() | {name: _version(name) for name in ("llvmlite", *PEERS)}
 
 
@@ -117,9 +117,14 @@ RESULTS = (MARKDOWN, JSON, FIGURE)
 
 @dataclass(frozen=True)
 class Scale:
-    """Extent of the measurements: `methods`, each with a time `budget` [s]; `map_points` along each axis of the map, of
-    which `run_points` are run for 120 s; number of `members` in the scatter case; `stream`, the duration of streaming
-    [s]; `repetitions` of the growth measurements; number of `warm` starts.
+    """Extent of the measurements.
+
+    budget : approximate run time of each method [s].
+    map_points, run_points : points along each axis of the map, and those of them that are also run for 120 s.
+    members : number of specimens in the scatter case.
+    stream : duration of the streamed motion [s].
+    repetitions : number of runs at each size in the growth measurements.
+    warm : number of starts with a filled compiler cache.
     """
 
     name: str
@@ -224,7 +229,9 @@ def run_benchmark(
             raise InvalidInput("part", name, f"it must be one of {', '.join(PARTS)}")
     for name in RESULTS:
         if (out / name).exists():
-            raise InvalidInput("out", str(out), f"it already contains {name}; results are never overwritten")
+            raise InvalidInput(
+                "out", str(out), f"it already contains {name}; results are never overwritten, so choose another folder"
+            )
     load_model(progress)
     begin, started = time.perf_counter(), datetime.now().astimezone()
     sections: list[Section] = []

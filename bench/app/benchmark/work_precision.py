@@ -144,7 +144,7 @@ GAIN_COLUMNS = (
     Column("solver", "solver"),
     Column("alpha_1", "alpha_1", ".10f"),
     Column("alpha_2", "alpha_2", ".10f"),
-    Column("off_percent", "alpha_2 off by [%]", "+.2e"),
+    Column("off_percent", "error of alpha_2 [%]", "+.2e"),
 )
 
 
@@ -168,7 +168,7 @@ def steady_by_time() -> Section:
             )
     notes = (
         f"Runs of 120 s from a point of the orbit; peaks over the last {LAST_PERIODS} periods. The paper's "
-        "procedure places impacts on its time grid: its solution wanders about the orbit, and the result "
+        "procedure places impacts on its time grid; its solution therefore wanders about the orbit, and the result "
         "depends on the window.",
     )
     return Section("steady_by_time", "Gain coefficients by 120 s runs", GAIN_COLUMNS, rows, notes)
@@ -285,14 +285,14 @@ def _targets(rows: list[dict[str, Cell]]) -> list[Target]:
             "time relative to heyoka at equal error, peaks", 1 / 3, at_equal_error("taylor", "heyoka, with peaks"), "1"
         ),
         Target(
-            "time with peaks relative to scipy DOP853 (1e-10) without",
+            "time with peaks relative to scipy DOP853 (1e-10) without peaks",
             1 / 400,
             share("scipy DOP853", "rtol 1e-10"),
             "1",
         ),
         Target("the same, equations in Python", 1 / 400, share("scipy DOP853, Python", "rtol 1e-10"), "1"),
-        Target(f"time of taylor ({setting}) over time of paper", 1.0, _quotient(fine_time, papers_time), "1"),
-        Target(f"error of taylor ({setting}) over error of paper", 1e-10, _quotient(fine_error, papers), "1"),
+        Target(f"time of taylor ({setting}) over that of paper", 1.0, _quotient(fine_time, papers_time), "1"),
+        Target(f"error of taylor ({setting}) over that of paper", 1e-10, _quotient(fine_error, papers), "1"),
     ]
 
 

@@ -31,7 +31,7 @@ HEADLINES = ("status", "alpha_2", "alpha_2_uncertainty", "alpha_2_predicted", "a
 """Fields that are printed if a protocol has them; the file contains all fields."""
 
 WIDEST = 44
-"""Maximum number of printed characters of a value or label."""
+"""Maximum length of a printed value or label [characters]."""
 
 
 def analyse(
@@ -81,8 +81,8 @@ def analyse(
 ) -> int:
     """Recompute every result of a recorded campaign from its samples, with other settings.
 
-    The new results are written to a separate file in the same folder, with the settings and with the name and SHA-256
-    of the recorded file, and are printed next to the old ones. A protocol that identifies the specimen also writes
+    The new results are printed next to the old ones and written to a separate file in the same folder, together with
+    the settings and the name and SHA-256 of the recorded file. A protocol that identifies the specimen also writes
     `<name>.specimen.json` for other runs. Settings that would have changed the drive of the table are refused: the
     recorded samples cannot show their effect.
 

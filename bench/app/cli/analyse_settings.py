@@ -28,10 +28,11 @@ LIST = "--list shows all of them with their values and units"
 class Choice:
     """Inputs of a re-analysis.
 
-    `asked` are the parameters of the campaign, `settings` those of the analysis; `changed` is the `recorded`
-    configuration with the new settings applied, and `given` maps the name of each new setting to its value. A protocol
-    that defines a re-analysis has a `follower`; any other protocol is executed again with the settings as its
-    parameters.
+    recorded, changed : configuration in the file, without and with the new settings.
+    asked, settings : parameters of the campaign, and those of the analysis.
+    given : value of each new setting, by name.
+    follower : constructor of the re-analysis that the protocol defines; None for any other protocol, which is executed
+        again with `settings` as its parameters.
     """
 
     protocol: "Protocol[Any]"

@@ -25,7 +25,7 @@ class LiveConsole:
     """A subscriber that displays the run on a terminal; a context manager that restores the terminal on exit.
 
     Events only update the display in memory. A separate thread redraws it after a change, so that the engine never
-    waits for a terminal. When a `person_answers` the questions, the display is hidden while one is open.
+    waits for a terminal. With `person_answers`, the display is hidden while a question to the operator is open.
     """
 
     def __init__(self, console: Console, person_answers: bool = False) -> None:

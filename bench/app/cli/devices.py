@@ -75,7 +75,7 @@ def devices(
 
 
 def _daq(server: str | None, tls: "Tls | None", *, plain: bool) -> "tuple[list[FoundDevice], str | None]":
-    """The NI devices, or an empty list and the reason if the search failed."""
+    """The NI devices and None, or an empty list and the reason if the search failed."""
     try:
         require("ni", "the search for NI devices")
         from drivers.daqmx.devices import find_devices
@@ -92,7 +92,9 @@ def _configured(hardware: "Hardware | None") -> tuple[str, ...]:
 
 
 def _lasers(ports: tuple[str, ...]) -> "tuple[list[FoundLaser], str | None]":
-    """The lasers on the serial ports, or an empty list and the reason if the search failed."""
+    """The lasers on the serial ports and None, or an empty list and the reason if the package for the search is not
+    installed.
+    """
     try:
         require("serial", "the search for lasers")
     except MissingExtra as error:

@@ -127,7 +127,9 @@ def _text(found: "Preflight") -> str:
 
 
 def _margins(margins: "tuple[Margin, ...]") -> str:
-    """Table of margins, tightest first; the columns "at 95 %" hold for 95 % of the specimens within the uncertainty."""
+    """Table of margins, tightest first; the margins in the columns "at 95 %" are kept by 95 % of the specimens within
+    the uncertainty.
+    """
 
     def number(value: float | None) -> str:
         return ABSENT if value is None else f"{value:.4g}"

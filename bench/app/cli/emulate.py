@@ -45,8 +45,8 @@ def emulate(
             metavar="MODULE",
             negative=(),
             consume_multiple=True,
-            help="Modules of a chassis, starting with the first slot: 9205, 9215, 9234, 9239, 9263, 9269, 9401, "
-            "9421, 9485.",
+            help="Modules of a chassis, in the order of its slots. Available modules: 9205, 9215, 9234, 9239, 9263, "
+            "9269, 9401, 9421, 9485.",
             show_default="9205 9263 9401 9485",
         ),
     ] = None,
@@ -54,7 +54,7 @@ def emulate(
         str | None,
         Parameter(
             metavar="HZ",
-            help="Samples per second of drive, inputs and virtual bench (at most 20000).",
+            help="Sample rate of the drive, the inputs and the virtual bench [1/s] (at most 20000).",
             show_default="that of the simulation",
         ),
     ] = None,
@@ -63,7 +63,7 @@ def emulate(
         str | None,
         Parameter(
             metavar="S",
-            help="Lead of the drive in the written configuration; a busy computer needs a longer one.",
+            help="Lead of the drive [s] in the configuration of the client; a busy computer needs a longer lead.",
             show_default="as configured",
         ),
     ] = None,
@@ -95,7 +95,7 @@ def emulate(
     given = configuration_from(config, seed)
     if given.backend != "simulated":
         raise InvalidInput(
-            "backend", given.backend, "it must be the simulated bench, which the emulated laboratory uses"
+            "backend", given.backend, 'it must be "simulated", because the emulated laboratory uses the simulated bench'
         )
     configuration = _with_lead(_at_rate(given, sample_rate), lead)
     from bench.config.review import review
@@ -198,7 +198,7 @@ def _hand_out(configuration: "BenchConfiguration", laboratory: "Laboratory", pat
     _say(f"DAQ at {hardware.daq.server}, {hardware.sample_rate:g} samples per second")
     for name, laser in (("laser 1", hardware.laser_1), ("laser 2", hardware.laser_2)):
         _say(f"{name} at {laser.port if hardware.lasers.connection == 'serial' else laser.terminal}")
-    named = path if path is not None else "FILE, after saving the text above in FILE"
+    named = path if path is not None else "FILE, once the text above is saved as FILE"
     _say(f"in another terminal: rockbench check --config {named}")
     _say("Ctrl-C closes the laboratory")
 

@@ -22,7 +22,9 @@ if TYPE_CHECKING:
 P = TypeVar("P", bound=Parameters)
 
 MOST_POINTS = 1_000_000
-"""Maximum number of points of all ranges together; a larger number is probably a typing error."""
+"""Maximum number of points: the product of the numbers of values of all ranges; a larger one is probably a typing
+error.
+"""
 
 SPECIMEN_FILE = ".json"
 """Extension of a specimen file, which holds identified properties."""
@@ -95,7 +97,11 @@ def request_from(model: type[P], arguments: Mapping[str, Any]) -> P:
     axes = [name for name in _AXES if name in wanted]
     points = prod(len(wanted[name]) for name in axes)
     if points > MOST_POINTS:
-        raise InvalidInput(" times ".join(flag(name) for name in axes), points, f"at most {MOST_POINTS} points")
+        raise InvalidInput(
+            " times ".join(flag(name) for name in axes),
+            points,
+            f"at most {MOST_POINTS} points are allowed; specify fewer",
+        )
 
     def named(path: tuple[str | int, ...]) -> str:
         return flag(str(path[0])) if path else dotted(path)
@@ -169,7 +175,7 @@ def specimen_from(
 
 
 def records_from(files: Sequence[str]) -> "tuple[Accelerogram, ...]":
-    """The named records, or the seven synthetic ones. Raises InvalidInput."""
+    """The records named on the command line, or the seven synthetic ones. Raises InvalidInput."""
     from bench.accelerograms.reference import RecordReference, read_records
     from bench.accelerograms.synthetic import NAMES
 
@@ -198,6 +204,6 @@ def named_records(named: Sequence[str]) -> list[str]:
             else:
                 good.append(str(path))
         if not good:
-            raise InvalidInput("--records", text, "no file in this folder is a complete record")
+            raise InvalidInput("--records", text, "no file in this folder is a complete record; choose another folder")
         found += good
     return found

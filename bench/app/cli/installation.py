@@ -38,9 +38,13 @@ def init(
     from bench.config.template import write_template
 
     if minimal and hardware:
-        raise InvalidInput("--minimal", "--hardware", "use only one of them")
+        raise InvalidInput("--minimal", "--hardware", "the two options exclude each other; use only one of them")
     if backend is not None and (minimal or hardware):
-        raise InvalidInput("--backend", backend, f"not allowed with {'--minimal' if minimal else '--hardware'}")
+        raise InvalidInput(
+            "--backend",
+            backend,
+            f"it cannot be combined with {'--minimal' if minimal else '--hardware'}; use only one of them",
+        )
     write_template(file, "minimal" if minimal else "hardware" if hardware else "all", backend)
     what = (
         "the keys to check first"
@@ -137,7 +141,7 @@ def completion(
         else:
             print(root.generate_completion(shell=shell))
     except ShellDetectionError:
-        raise InvalidInput("SHELL", "none", "the running shell was not recognised: name bash, zsh or fish") from None
+        raise InvalidInput("SHELL", "none", "the running shell was not recognised; specify bash, zsh or fish") from None
     except OSError as error:
         where = "its start-up file" if error.filename is None else Path(error.filename)
         raise InvalidInput("--install", str(where), f"the file cannot be written: {error.strerror}") from None

@@ -218,8 +218,8 @@ def interrupted_text(text: str = "interrupted", otherwise: str = "") -> str:
 
 
 def report_interrupt(text: str | None = None, *, in_result: bool = False) -> None:
-    """Report the interrupt once, as one line on standard error, `interrupted_text` unless `text` is given; with --json
-    also as an object, unless the command's result states it (`in_result`).
+    """Report the interrupt once, as one line on standard error: `text` if given, else `interrupted_text`. With --json
+    it is also reported as an object, unless the command's result states it (`in_result`).
     """
     text = text or interrupted_text()
     if _watch is None or _watch.claim():

@@ -172,8 +172,8 @@ class RunOptions:
         Parameter(
             help=(
                 "Timing of the acquisition, instead of block_duration and lead in [acquisition]. With fast, the bench "
-                "reacts to a limit within 20 ms (35 ms through a gRPC server, without serial lasers), but needs an "
-                "idle computer; with steady, it reacts within 0.2 s."
+                "reacts to a limit within 20 ms (35 ms through a gRPC server, without serial lasers); this requires "
+                "an idle computer. With steady, it reacts within 0.2 s."
             ),
         ),
     ] = None

@@ -182,7 +182,7 @@ def _write(result: Result, options: "ResultOptions", progress: Progress) -> None
 
 
 def columns_text(table: "Table", headings: Mapping[str, str]) -> str:
-    """The columns of a table named by `headings`, under these headings."""
+    """Text table of the columns that are keys of `headings`, each under its heading."""
     columns = [
         TextColumn(heading, "" if (unit := table[name].unit) == "1" else unit) for name, heading in headings.items()
     ]
@@ -191,7 +191,7 @@ def columns_text(table: "Table", headings: Mapping[str, str]) -> str:
 
 
 def cell(value: Any) -> str:
-    """A value of a table as text, numbers with five significant digits."""
+    """A value of a table as text; numbers have five significant digits."""
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, float):

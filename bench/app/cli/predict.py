@@ -66,7 +66,7 @@ _Records = Annotated[
 
 @dataclass(frozen=True)
 class Subject:
-    """Specimen of a prediction and its uncertainty; for predictions under records also the bench and the records."""
+    """Specimen of a prediction and its uncertainty; the bench and the records are used only under records."""
 
     specimen: "Specimen"
     known: "SpecimenKnowledge"
@@ -208,15 +208,15 @@ stability = _sine(
     "predict_on_table:stability",
     "Stability boundaries of the rocking motions in frequency, on fixed ground and on a table.\n\nThe block pushes "
     "the table, which changes how a disturbance grows or decays: a motion may be stable on the table and unstable on "
-    "fixed ground. The table's motion is a sine up to the harmonic --harmonics; the drive does not react within a "
-    "period. The boundaries are listed; --csv, --json and --plot contain the multipliers of every point.",
+    "fixed ground. Up to the harmonic --harmonics, the table's motion is a pure sine; the drive does not react within "
+    "a period. The boundaries are listed; --csv, --json and --plot contain the multipliers of every point.",
 )
 attractor = _sine(
     AttractorRequest,
     "predict_on_table:attractor",
     "Long-term motions on a table, where the periodic rocking motion is unstable: period, peaks, falls.\n\nThe motion "
-    "is simulated from the disturbed orbit for --cycles; the drive keeps the mean of the table's harmonics. The "
-    "motion repeats after several cycles, does not repeat, or ends with a fall. The range of the greatest peak and "
+    "is simulated from the disturbed orbit over --cycles cycles; the drive keeps the mean of the table's harmonics. "
+    "The motion repeats after several cycles, does not repeat, or ends with a fall. The range of the greatest peak and "
     "the share of falls are computed with randomly drawn specimens. With many frequencies the figure is a bifurcation "
     "diagram.",
 )

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from rich.progress import TaskID
 
 YOUNG = 50_000
-"""Number of new objects after which Python searches for unreachable ones, which takes a few milliseconds."""
+"""Number of new objects after which Python searches for unreachable ones; a search takes a few milliseconds."""
 
 
 def run() -> None:
@@ -40,7 +40,7 @@ def run() -> None:
     except BaseException:
         if interrupts.first is None:
             raise
-        # an interrupt that a library converted to its own error
+        # an interrupt that a library has converted into an error of its own
         report_interrupt()
         code = 130
     if interrupts.exit_code is not None or code == 130:

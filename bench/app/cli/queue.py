@@ -138,7 +138,9 @@ def _run_one(
             told = f"failed: {ended}"
         else:
             good = ended.status in GOOD and ended.passed
-            told = f"{ended.status}: {ended.reason}" if ended.passed else f"{ended.status}, but not passed"
+            told = (
+                f"{ended.status}: {ended.reason}" if ended.passed else f"{ended.status}, but at least one check failed"
+            )
             if ended.status == "completed" and good:
                 return None
     except InvalidInput as refused:

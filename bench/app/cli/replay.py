@@ -92,7 +92,7 @@ def _clock(speed: str) -> "Clock":
     from bench.config.numbers import read_number
     from bench.replay.session import PacedClock
 
-    allowed = f"a number from 0.01 to 1000, or {MAX}"
+    allowed = f"it must be a number from 0.01 to 1000, or {MAX}"
     try:
         factor = read_number(speed)
     except ValueError as error:
@@ -112,7 +112,7 @@ def _text(replayed: "Replayed", table: str) -> str:
     if replayed.ended is not None:
         lines.append(f"The recording is incomplete: {replayed.ended}")
     lines += [
-        f"Not reproducible from the samples, therefore replaced by a requested abort: {reason}"
+        f"This reason cannot be reproduced from the samples and was replaced by a requested abort: {reason}"
         for reason in replayed.in_place
     ]
     compared = ", ".join(_counted(count, part) for part, count in replayed.found.compared.items() if count)
@@ -121,7 +121,7 @@ def _text(replayed: "Replayed", table: str) -> str:
     if not replayed.same_intervals:
         lines.append("The file is from an older version; its uncertainties were not compared")
     if replayed.identical:
-        there = " up to there" if replayed.ended is not None else ""
+        there = " up to its end" if replayed.ended is not None else ""
         lines.append(f"Bit-identical to the file{there}: {compared}")
         return "\n".join(lines)
     differences = sorted(replayed.found.differences, key=lambda each: each.rounding)

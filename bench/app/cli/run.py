@@ -130,7 +130,7 @@ def _add_to_queue(
 ) -> int:
     """`rockbench run ... --queue FILE`: check the plan and append the test to the queue. Returns the exit code.
 
-    Raises InvalidInput also while another program owns the queue.
+    Raises InvalidInput for a refused plan, and while another program owns the queue.
     """
     progress("loading the program")
     from bench.app.preflight import compile_run, prepare

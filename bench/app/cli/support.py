@@ -37,7 +37,7 @@ def doctor(
 
     folder = out or Path.cwd()
     if not folder.is_dir():
-        raise InvalidInput("--out", str(folder), "the folder does not exist")
+        raise InvalidInput("--out", str(folder), "the folder does not exist; create it, or specify another folder")
     found = list(examine(folder, server))
     rows = [(each.item, str(each.health), each.found, each.remedy) for each in found]
     bad = any(each.health is Health.BAD for each in found)

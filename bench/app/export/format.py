@@ -67,7 +67,7 @@ class TableColumn:
 
 @dataclass(frozen=True)
 class Content:
-    """Everything exported from an open file. `tables` holds the non-empty tables."""
+    """All exported contents of an open file. `tables` contains the non-empty tables."""
 
     runs: tuple[RecordedRun, ...]
     signals: tuple[Signal, ...]
@@ -169,9 +169,12 @@ def _anything(content: Content) -> None:
 
 @dataclass(frozen=True)
 class ExportFormat:
-    """An export format: writes open files for other programs. Its name for `--to` is that of the entry point. `write`
-    fills a new folder; `check` raises InvalidInput, before the folder is created, for contents that the format cannot
-    represent. `title` is the name shown in the window. `library` is a required module of the extra `export`.
+    """An export format: writes open files for other programs. Its name for `--to` is that of the entry point.
+
+    title : name shown in the window.
+    write : fills a new folder.
+    check : raises InvalidInput, before the folder is created, for contents that the format cannot represent.
+    library : required module of the extra `export`; empty for none.
     """
 
     title: str

@@ -86,7 +86,7 @@ def variables(names: Sequence[str], taken: Iterable[str] = ()) -> list[str]:
 
 
 class _OneAtATime(Mapping[str, Any]):
-    """Values that are computed on access and not retained."""
+    """Mapping whose values are computed on each access and not retained."""
 
     def __init__(self, makers: Mapping[str, Callable[[], Any]]) -> None:
         self._makers = makers

@@ -70,7 +70,7 @@ def _units(pyuff: Any) -> dict[str, Any]:
 
 
 def _parts(signal: Signal, values: NDArray[Any], time: NDArray[np.float64], rate: float) -> Iterator[tuple[int, int]]:
-    """Uninterrupted parts of the signal as [start, stop), at least two samples each."""
+    """Uninterrupted parts of the signal as index ranges [start, stop) of at least two samples each."""
     good = np.isfinite(values)
     # the sample after a gap begins a part
     follows = np.concatenate(([False], np.diff(time) < 1.5 / rate))

@@ -8,12 +8,12 @@ from bench.live_values import TWIN_TRACE, TwinEstimate
 
 _SECONDS, _THETA = (TWIN_TRACE.index(name) for name in ("seconds", "theta"))
 STEP = 0.01
-"""Interval between two angles of the twin [s]."""
+"""Interval between two stored angles of the twin [s]."""
 KEPT = 500
 """Number of stored angles: five seconds."""
 BEHIND = 2.0
-"""Largest permitted lag of the twin behind the measurement [s of bench time]. Such lags occur when a run is faster than
-real time.
+"""Largest permitted lag of the twin behind the measurement [s], in bench time. Such lags occur when a run is faster
+than real time.
 """
 CAPACITY = 30_000
 """Number of stored bins: a minute at two milliseconds each."""
@@ -79,8 +79,8 @@ class Ring:
         return self._time[kept], self._low[kept], self._high[kept]
 
     def at(self, time: float) -> NDArray[np.float64]:
-        """Midpoints of the bin at bench time `time` [s], shape (n_signals,); outside the buffer the newest or oldest
-        bin, zero without bins.
+        """Midpoints of the bin at bench time `time` [s], shape (n_signals,); those of the newest or oldest bin for a
+        time outside the buffer, and zero without bins.
         """
         if not self._size:
             return np.zeros(self._low.shape[1])

@@ -128,7 +128,7 @@ class MatrixView(QTableWidget):
             self.refresh(float("nan"))
 
     def follow(self, event: Event, remaining: float) -> None:
-        """Update with an event; `remaining` is the time left of the run [s]."""
+        """Update with an event; `remaining` is the remaining time of the run [s]."""
         if self.campaign is None:
             return
         before = self.campaign.current

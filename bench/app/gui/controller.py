@@ -38,15 +38,16 @@ from bench.events import State, StateChanged
 from drivers.clock import now
 
 PERIOD = 28
-"""Redraw interval [ms], for slightly more than thirty redraws per second; and maximum interval between checks of the
-connection.
+"""Redraw interval [ms], for slightly more than thirty redraws per second; also the maximum interval between checks of
+the connection.
 """
 
 BUDGET = 0.02
 """Maximum time for handling messages in one iteration of the main loop [s]; the rest waits for the next iteration."""
 
 DELIBERATE = 0.7
-"""Time after a press of STOP in which further presses are ignored [s]: a double click counts as one press."""
+"""Time after a press of STOP during which further presses are ignored [s], so that a double click counts as one press.
+"""
 
 
 class Controller(QObject):
@@ -65,11 +66,11 @@ class Controller(QObject):
     asked = Signal(object)
     """Emits a `Question`, and None when it is no longer open."""
     plan_checked = Signal(object, object)
-    """Emits the result of `check_plan`, `PlanChecked` or `Refused`, and the object that requested it."""
+    """Emits the result of `check_plan`, a `PlanChecked` or a `Refused`, and the object that requested it."""
     began = Signal(object)
     """Emits the `Run` that was just started."""
     ended = Signal(object)
-    """Emits how the run ended: `Ended` or `Refused`."""
+    """Emits the end of the run: an `Ended` or a `Refused`."""
     _heard = Signal()
 
     def __init__(self, parent: QObject | None = None) -> None:
@@ -92,7 +93,7 @@ class Controller(QObject):
         self.attached: RunningSession | None = None
         """The session of another window, or of a terminal, whose current or last run is shown."""
         self.controls = True
-        """Whether this window controls the run: whether it may answer questions and ramp out. STOP is always effective.
+        """Whether this window controls the run, that is, may answer questions and ramp out. STOP is always effective.
         """
         self.elsewhere: RunningSession | None = None
         """A session under way on this computer to which this window is not attached."""

@@ -97,7 +97,7 @@ class Form(QWidget):
 
 
 def _parts(entry: Declared, text: str) -> list[str]:
-    """Split a list of values: strings, which may contain spaces, at semicolons; numbers at spaces, as on the command
+    """Split the text of a list: strings, which may contain spaces, at semicolons; numbers at spaces, as on the command
     line.
     """
     return [part.strip() for part in text.split(";") if part.strip()] if entry.kind is str else [text]
@@ -141,7 +141,7 @@ def _tip(entry: Declared) -> str:
 
 
 class RunOptions(QWidget):
-    """Folder of the results, operator, note, pace, and source of answers to questions."""
+    """Form of the options of a run: folder of the results, operator, note, pace, and who answers the questions."""
 
     def __init__(self, configuration: BenchConfiguration) -> None:
         super().__init__()
@@ -200,7 +200,7 @@ class RunOptions(QWidget):
         }
 
     def run(self, plan: PlanCheck) -> Run:
-        """The run for a plan."""
+        """The request to run a plan with these options."""
         told = {"operator": self.operator.text().strip(), "notes": self.note.text().strip()}
         return Run(
             plan.protocol,

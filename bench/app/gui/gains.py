@@ -17,7 +17,7 @@ from bench.datafile.tables import Table
 Kind = Literal["spectrum", "curve"]
 
 LOW, HIGH = "alpha_2_low", "alpha_2_high"
-"""Columns of a prediction: uncertainty band of alpha_2 (k = 2), where known."""
+"""Columns of a prediction with the uncertainty band of alpha_2 (k = 2), where known."""
 LEAST = 1e-3
 """Smallest gain that is drawn: the axis of a spectrum is logarithmic."""
 NOT_PLAYED = "not played"
@@ -28,8 +28,12 @@ _CURVE = frozenset({"record", "beta", "alpha_2"})
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """A predicted line, ascending in `x`; `band`, shape (2, n), has its lower and upper bounds. All in SI units. The
-    colour represents `group`: a stiffness, or a record; a line that is not `strong` is the weaker branch.
+    """A predicted line, in SI units.
+
+    group : stiffness or name of the record, represented by the colour.
+    x, gain : abscissa, ascending, and gain, both of shape (n,).
+    band : lower and upper bounds of the gain, shape (2, n); None if unknown.
+    strong : False for the weaker branch.
     """
 
     group: float | str
@@ -42,7 +46,7 @@ class Line:
 
 @dataclass(frozen=True)
 class Mark:
-    """A measured point; `gain` is None where none was measured, `spread` its expanded uncertainty."""
+    """A measured point; `gain` is None if none was measured, and `spread` is the expanded uncertainty of the gain."""
 
     group: float | str
     x: float
@@ -163,7 +167,7 @@ class Difference:
 
 
 def compare(reference: Sequence[Mapping[str, Any]], other: Sequence[Mapping[str, Any]]) -> list[Difference]:
-    """Every point of either run, in order, those of the reference first. Of repeated measurements, the last one counts.
+    """Compare every point of either run, those of the reference first. Of repeated measurements, the last one is used.
     Uncertainties are the root sum of squares of the points' uncertainties (k = 2).
     """
     before, after = _by_key(reference), _by_key(other)

@@ -18,13 +18,13 @@ from bench.preflight.margins import Margin, bounds
 from sim.channel import STOREYS
 
 SPAN = 2.0
-"""Length of the two consecutive windows whose peaks give the growth of a quantity [s]."""
+"""Length [s] of each of the two consecutive windows whose peaks give the growth of a quantity."""
 GROWTH, NEAR = 0.02, 0.3
 """Least relative growth between the windows, and least share of the limit, for which a time to the limit is stated."""
 SOON = 60.0
 """Longest stated time to a limit [s]."""
 WARNED = 0.9
-"""Share of a limit from which a quantity without a declared warning level is marked."""
+"""Share of its limit at or above which a quantity without a declared warning level is marked."""
 LEAST_ROW, LARGEST_ROW = 30, 52
 """Height of a meter [px]."""
 HIDDEN = ("drive_voltage", "drive_slew")
@@ -33,8 +33,10 @@ HIDDEN = ("drive_voltage", "drive_slew")
 
 @dataclass
 class Meter:
-    """Magnitude of a quantity with its `limit`, both in SI units; `warning` and `planned` are shares of the limit. 95 %
-    of the specimens stay below `planned`, which is NaN if not predicted.
+    """Magnitude of a quantity and its `limit`, both in SI units.
+
+    warning : share of the limit at or above which the quantity is marked.
+    planned : share of the limit below which 95 % of the specimens are predicted to stay; NaN if not predicted.
     """
 
     key: str

@@ -25,7 +25,9 @@ HIGHEST = 10.0
 MODELLED = 3.0
 """Displayed length of the live model's motion [s]."""
 SMOOTH = np.full(5, 0.2)
-"""Weights of the bins for the velocity: the noise of the lasers is larger than the motion within a bin."""
+"""Weights of the bins for the velocity, which average over several bins: the noise of the lasers is larger than the
+motion within a bin.
+"""
 _DRIFT = TRACES.index("drift")
 _T, _U1, _U2 = (TWIN_TRACE.index(name) for name in ("seconds", "u1", "u2"))
 

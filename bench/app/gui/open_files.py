@@ -26,9 +26,7 @@ DRIVE = "drive"
 
 @dataclass(frozen=True, eq=False)
 class RunFile:
-    """Description of a file, its points and its prediction; `runs` holds the numbers of its runs and their durations
-    [s].
-    """
+    """Description of a file, its points and its prediction; `runs` maps the number of each run to its duration [s]."""
 
     path: Path
     headline: str
@@ -36,7 +34,7 @@ class RunFile:
     results: Mapping[str, Column]
     prediction: Table
     channels: Mapping[str, str]
-    """Name and unit of every channel, the drive last."""
+    """Unit of every channel by name, the drive last."""
     runs: Mapping[int, float]
     labels: Mapping[str, str] = field(default_factory=dict[str, str])
     """Printed names of fields of a point, as declared by the protocol."""

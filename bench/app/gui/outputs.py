@@ -1,4 +1,6 @@
-"""Report on and export of a file, using the command-line commands; existing files are never overwritten."""
+"""Report on a file, and export of a file, both by the commands of the command line; existing files are never
+overwritten.
+"""
 
 from contextlib import suppress
 from pathlib import Path

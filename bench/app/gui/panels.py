@@ -14,7 +14,7 @@ from bench.events import Event, OperatorAsked, PointFinished
 from drivers.rig import OperatorTask
 
 UNREAD = 700
-"""Time after a question appears during which answers are ignored [ms], since it cannot have been read yet."""
+"""Time after the appearance of a question during which answers are ignored [ms], since nobody can have read it yet."""
 
 
 _AT_ZERO = "The output is at zero and the rig is stopped until you answer."
@@ -38,7 +38,7 @@ TASKS = {
     ),
     OperatorTask.UNLOCK_FRAME: (
         f"The next tests require a free frame. {_AT_ZERO}",
-        _NOT_CHECKED.format(what="The next test is the first that would detect a clamp left on a storey."),
+        _NOT_CHECKED.format(what="A clamp left on a storey is not detected before the next test."),
     ),
     OperatorTask.HOLD_BLOCK: (
         f"The spring is measured with the block clamped, so that it cannot lift. {_AT_ZERO}",
@@ -46,7 +46,7 @@ TASKS = {
     ),
     OperatorTask.LOCK_TABLE: (
         f"The manual release must not move the table. {_AT_ZERO} A clamped table is not driven.",
-        _NOT_CHECKED.format(what="Recordings with the clamped table are made without drive."),
+        _NOT_CHECKED.format(what="Tests with the clamped table are recorded without drive."),
     ),
     OperatorTask.UNLOCK_TABLE: (
         f"The table must be free before it is driven again. {_AT_ZERO}",
@@ -116,7 +116,7 @@ class Prompt(QFrame):
         controller.asked.connect(self._ask)
 
     def _tell(self, event: Event) -> None:
-        """Store the event, which precedes the question and contains the kind of task."""
+        """Store the event that precedes the question and contains the kind of task."""
         if isinstance(event, OperatorAsked):
             self._asked = event
 
@@ -214,7 +214,7 @@ class LeavePanel(QFrame):
         self.hide()
 
     def ask(self, *, goes_on: bool) -> None:
-        """Show the question; `goes_on` states that the run continues without the window."""
+        """Show the question; `goes_on` is True if the run continues without the window."""
         self.question.setText(texts.LEAVE_GOES_ON if goes_on else texts.LEAVE_RAMPS_OUT)
         self.show()
         self.stay.setFocus()

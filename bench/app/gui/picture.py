@@ -189,8 +189,8 @@ class PhysicalPicture(QWidget):
         self.canvas.update()
 
     def move_to(self, motion: NDArray[np.float64], block: tuple[float, float] | None) -> None:
-        """Show the signals `bench.app.ipc.messages.TRACES` of one instant, and the block: its angle [rad] and the time
-        since its last impact [s], None if unknown.
+        """Show one instant: the signals `bench.app.ipc.messages.TRACES`, and the block's angle [rad] and time since its
+        last impact [s], None if unknown.
         """
         self._motion = np.nan_to_num(motion)
         self._angle, self._struck = block or (None, float("inf"))
@@ -204,7 +204,7 @@ class PhysicalPicture(QWidget):
         self._draw()
 
     def show_age(self, seconds: float | None) -> None:
-        """Label the picture as not live for this number of seconds; None while it is live."""
+        """Label the picture with the number of seconds for which it has not been live; None while it is live."""
         self._age = seconds
         self._draw()
 

@@ -89,7 +89,9 @@ class PlanView(QWidget):
 
 
 def _left(each: Margin) -> float:
-    """Margin kept by 95 % of the specimens, or else the margin of the nominal specimen; infinite if not predicted."""
+    """Margin kept by 95 % of the specimens or, if that is unknown, the margin of the nominal specimen; infinite if
+    neither is predicted.
+    """
     left = each.margin if each.likely is None else each.likely
     return inf if left is None else left
 

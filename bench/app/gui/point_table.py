@@ -20,10 +20,13 @@ _GOOD = ("", "steady", "held", "measured", "resting")
 
 @dataclass(frozen=True)
 class Measured:
-    """A measured quantity of a point in the SI `unit`; expanded uncertainties (k = 2). NaN where there is no value.
+    """A measured quantity of a point and its prediction, in the SI `unit`, with expanded uncertainties (k = 2). NaN
+    where there is no value.
 
-    `agrees` is None without a comparison; `low` and `high` bound a predicted interval that is stated instead of an
-    uncertainty. `status` describes the point, `field` is the name of the quantity in it.
+    low, high : bounds of a predicted interval, which is shown instead of `predicted_uncertainty`.
+    agrees : whether measurement and prediction agree; None without a comparison.
+    status : status of the point.
+    field : name of the quantity in the data of the point.
     """
 
     point: str
@@ -181,7 +184,7 @@ def _point(point: Mapping[str, Any], results: Mapping[str, Column]) -> str:
 
 
 def _quantity(stem: str, description: str) -> str:
-    """α₂ by its symbol, any other quantity by the first words of its description."""
+    """Displayed name of a field: the symbol of a gain, such as α₂, or the first words of the field's description."""
     return label(stem) if stem.startswith("alpha_") and stem[6:].isdigit() else spaced(first_words(description) or stem)
 
 

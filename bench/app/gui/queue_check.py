@@ -38,9 +38,9 @@ class QueueCheck(QObject):
     good = Signal()
     """Emitted when all plans were accepted."""
     refused = Signal(object, str)
-    """Emitted at a refusal: the refused test, or None if the tests were refused together, and the reason."""
+    """Emits the refused test, or None if the tests were refused together, and the reason."""
     changed = Signal()
-    """Emitted when the check of another test has begun."""
+    """Emitted when the check of the next test has begun."""
 
     def __init__(self, controller: Controller, parent: QObject) -> None:
         super().__init__(parent)
@@ -63,7 +63,7 @@ class QueueCheck(QObject):
         )
 
     def begin(self, tests: Sequence[Queued], configuration: BenchConfiguration) -> None:
-        """Check the pending tests of the queue `tests` that have not been checked yet; there is at least one."""
+        """Check those pending tests of the queue `tests` that have not been checked yet; there must be at least one."""
         self._tests, self._configuration = tuple(tests), configuration
         self.test = next(test for test in self._waiting if self.known(test, configuration) is None)
         whole = self._tests

@@ -29,7 +29,7 @@ from bench.protocol import Protocol
 
 LOWEST = 150
 """Height below which the list with its buttons scrolls [px]."""
-COPIES, COPIES_TIP = "times", "Number of copies that *Repeat* inserts below the test."
+COPIES, COPIES_TIP = "times", "Number of copies that Repeat inserts below the selected test."
 QUEUE_ACTIONS = (
     ("up", "Up", "Ctrl+Up", "Moves the test one place up"),
     ("down", "Down", "Ctrl+Down", "Moves the test one place down"),

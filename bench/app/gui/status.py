@@ -26,7 +26,7 @@ DRIVEN = frozenset({State.ARMED, State.RUNNING, State.STOPPING, State.ABORTING})
 
 @dataclass(frozen=True)
 class Status:
-    """Displayed word and reason, and the level and shape by which the style conveys them."""
+    """Displayed word and reason, and the level (colour) and shape that represent them."""
 
     word: str
     reason: str
@@ -37,8 +37,8 @@ class Status:
 def bench_status(
     link: Literal["none", "starting", "linked", "no link", "over"], state: State, reason: str, silence: float
 ) -> Status:
-    """Status from state and connection; `silence` [s] is the time since the last message. Without a connection the last
-    known state is not shown.
+    """Status to be displayed for a state and a connection; `silence` is the time since the last message [s]. Without a
+    connection, the last known state is not shown.
     """
     match link:
         case "none":

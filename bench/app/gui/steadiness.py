@@ -1,7 +1,7 @@
 """Steadiness of each sensor.
 
 The criterion is that of the run, applied to traces instead of samples. The run evaluates all sensors together; here
-each sensor is evaluated separately, which shows those that are not yet steady.
+each sensor is evaluated separately, which shows the sensors that are not yet steady.
 """
 
 from math import isfinite, tau

@@ -56,8 +56,8 @@ NO_INPUTS = "none configured"
 INPUT_GOOD, INPUT_OPEN, INPUT_UNKNOWN = "good", "OPEN", "unknown"
 INPUTS_UNREAD = "read while a run is under way"
 INPUTS_TIP = (
-    "Second contacts of emergency stop, over-travel switches and amplifier. They are read twice a second during a "
-    "run, and shown as unknown after {stale:g} s without a reading."
+    "Second contacts of the emergency stop, the over-travel switches and the amplifier. They are read "
+    "twice a second during a run, and shown as unknown after {stale:g} s without a reading."
 )
 
 CHECK = "Check the plan"
@@ -149,7 +149,7 @@ NOT_LIVE = "not live for {age:.0f} s"
 NOT_LIVE_AXIS = "seconds before the newest sample, " + NOT_LIVE
 ON_BLOCK = {
     "storey 2, u2": "laser 2, block {height:.0f} mm above the table",
-    "drift, u2 − u1": "laser 2 − laser 1, no drift",
+    "drift, u2 − u1": "laser 2 − laser 1, not the drift",
 }
 """Labels of the laser 2 traces while it measures the block."""
 FRAME_AND_BLOCK = "Frame: measured. Block: model, driven by the measured table motion"
@@ -187,7 +187,7 @@ DIFFERENCE_TIPS = (
     "gain in the first ticked file",
     "gain in this run",
     "this run minus the reference",
-    "expanded uncertainty (k = 2) of the difference: root sum of squares of both, assumed independent",
+    "expanded uncertainty (k = 2) of the difference: root sum of squares of the two uncertainties, assumed independent",
     "|difference| / uncertainty (ISO 13528)",
     "within: Eₙ is at most 1",
 )

@@ -20,9 +20,9 @@ from bench.app.ipc.messages import Traces
 from drivers.clock import now
 
 SHOWN = ("drive", "acceleration", "u1", "u2", "drift")
-"""The drawn columns, labelled by `texts.TRACES`."""
+"""Names of the drawn columns; `texts.TRACES` has their labels."""
 WINDOW, BUCKETS = 10.0, 700
-"""Displayed duration [s], and the number of its parts, each drawn as two points."""
+"""Displayed duration [s], and the number of parts into which it is divided, each drawn as two points."""
 AHEAD = 0.5
 """Longest time [s] for which the axis scrolls without a new sample."""
 STALE = 2.0
@@ -123,8 +123,8 @@ class TracePlot(QWidget):
 
     @property
     def moment(self) -> float:
-        """Bench time [s] of the instant that the picture shows: one block behind the newest sample, so that it advances
-        evenly.
+        """Bench time [s] of the instant that the picture shows, one block before the newest sample, so that the picture
+        advances evenly.
         """
         return self.ring.newest - max(self._length - self.age, 0.0)
 

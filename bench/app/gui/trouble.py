@@ -33,10 +33,10 @@ KEPT = "The data recorded until then are in {out}."
 DID_REFUSE = "The run was not started: nothing was armed or written."
 DID_NOT_START = "The rig was never armed; all devices were closed again."
 DID_LOSE = (
-    "The output is brought to zero whenever a session ends; if its process crashed, by watchdog and heartbeat where "
-    "configured. The data recorded until then remain readable."
+    "The output is brought to zero whenever a session ends; if its process crashed, by the watchdog and the heartbeat "
+    "where they are configured. The data recorded until then remain readable."
 )
-NOW_REFUSED = "Change the named value, then check the plan again."
+NOW_REFUSED = "Change the value named above, then check the plan again."
 NOW_LOOK = (
     "Look at the bench: if the table moves, press the emergency stop. Then run the loop check on the Setup page before "
     "the next test."
@@ -54,18 +54,18 @@ _NOW_DEVICE = (
     "page."
 )
 _NOW_DISK = (
-    "Free disk space, or enter a folder on another disk under *Results in*. `rockbench file info` describes the "
-    "recorded file."
+    'Free disk space, or enter a folder on another disk in the field "Results in". `rockbench file info` describes '
+    "the recorded file."
 )
 NOW = {
     "request": "Clear STOP in the bar at the top when the bench is safe. A new run starts from the beginning.",
     "client_lost": (
-        "This window did not respond for some seconds. Close other programs, then start again. With *Continue without "
-        "this window*, a run would continue in this case."
+        "This window did not respond for some seconds. Close other programs, then start again. With the option "
+        '"Continue without this window", a run continues in this case.'
     ),
     "declined": "Complete the task, or remove it from the plan, then start again.",
     "safety_input": (
-        "Find the cause at the bench and reset the input there; in the next run, the header shows the input as good."
+        "Find the cause at the bench and reset the input there. In the next run, the header must show that it is good."
     ),
     "limit": NOW_LIMIT,
     "disk": _NOW_DISK,
@@ -93,7 +93,7 @@ class Trouble:
 
 
 def trouble_of(ended: Ended | Refused, *, driven: bool) -> Trouble | None:
-    """The fault report of a run, None if it ended without a fault. `driven`: whether the rig was armed in the run."""
+    """The fault report of a run, None if it ended without a fault. `driven` is whether the rig was armed in the run."""
     if isinstance(ended, Refused):
         return _of_refusal(ended, driven=driven)
     if ended.status in QUIET:

@@ -24,7 +24,7 @@ STRETCH = 80
 UNBROKEN = 24
 """Greatest length of a part of the sentence that is kept on one line."""
 SPACE = 0.31
-"""Largest share of the page's height that the sentence may take."""
+"""Largest share of the page's height that the sentence may occupy."""
 
 
 def verdict_of(view: RunView, finished: Parameters) -> str:

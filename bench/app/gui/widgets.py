@@ -98,8 +98,8 @@ def set_level(label: QLabel, level: str) -> None:
 
 
 class ElidingLabel(QLabel):
-    """A one-line label that shortens its text with an ellipsis to the available width and then has a tooltip. It never
-    widens a page.
+    """A one-line label. It shortens a text that does not fit with an ellipsis, shows the full text in a tooltip, and
+    never widens a page.
     """
 
     def __init__(self, text: str = "") -> None:
@@ -187,8 +187,8 @@ def scrolling(content: QWidget, width: int, height: int) -> QScrollArea:
 
 
 class _Holder(QWidget):
-    """Keeps `content` at its natural size. It has no layout: with a layout, the area would give wrapped text its
-    preferred height and scroll although the contents fit.
+    """Keeps `content` at its natural size. It has no layout: with a layout, the scroll area would give wrapped text its
+    preferred height and would scroll even if the contents fit.
     """
 
     def __init__(self, content: QWidget, width: int, height: int) -> None:

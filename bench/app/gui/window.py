@@ -62,7 +62,7 @@ def restore(window: QMainWindow, pages: QTabWidget, settings: QSettings) -> None
 
 
 def _splitters(pages: QTabWidget) -> list[tuple[str, QSplitter]]:
-    """Each splitter, with a name composed of its page, its index on the page, and its number of parts."""
+    """Each splitter with its name, composed of its page, its index on the page, and its number of parts."""
     return [
         (f"splitters/{pages.tabText(place)}/{number}-{splitter.count()}", splitter)
         for place in range(pages.count())

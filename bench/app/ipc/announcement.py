@@ -22,7 +22,8 @@ from sim import waiting
 @contextmanager
 def announced(server: SessionServer, run: Run, owner: str) -> Generator[None]:
     """Context manager in which clients can attach to the session of `server`, which carries out `run` for its `owner`,
-    "window" or "terminal". If that is impossible, a warning is published and the owner is the only client.
+    "window" or "terminal". If the session cannot be announced, a warning is published and the owner remains the only
+    client.
     """
     folder = sessions_folder()
     if folder is None:
@@ -106,8 +107,8 @@ class _Limited:
 
 
 def _authenticate(connection: Connection, key: bytes) -> None:
-    """Exchange proofs of the key, as `Listener.accept` does. Raises OSError, EOFError or AuthenticationError; after an
-    unexpected message AssertionError or ValueError.
+    """Exchange proofs of the key, as `Listener.accept` does. Raises OSError, EOFError or AuthenticationError, and after
+    an unexpected message AssertionError or ValueError.
     """
     limited = cast(Connection, _Limited(connection))
     deliver_challenge(limited, key)

@@ -52,8 +52,8 @@ class ClientConnection:
 
     The client's main loop must call `alive` at least every `bench.app.ipc.messages.BEAT` seconds; otherwise the session
     considers the client frozen. `heard` is called in a thread of the connection when messages have arrived. `out` is
-    the folder of a run, from whose files the end of the run is read if its last message was lost; None for other
-    sessions.
+    the folder of a run: if the last message was lost, the end of the run is read from the files in it. It is None for
+    other sessions.
     """
 
     def __init__(self, out: Path | None, heard: Callable[[], None]) -> None:

@@ -39,10 +39,13 @@ class PlanCheck:
 
 @dataclass(frozen=True)
 class Run(PlanCheck):
-    """Request to run a protocol; its results are written to `out`. With `person`, the client answers the questions.
-    Otherwise a bench that needs no operator performs the operator tasks, and on any other bench every question is
-    answered with yes. With `keep_going`, the loss of the client does not end the run. `about` is stored in the data
-    file.
+    """Request to run a protocol; its results are written to `out`.
+
+    realtime : whether a simulated bench runs in real time.
+    person : whether the client answers the questions. Otherwise a bench that needs no operator performs the operator
+        tasks, and on any other bench every question is answered with yes.
+    keep_going : whether the run continues if the client is lost.
+    about : notes that are stored in the data file.
     """
 
     realtime: bool = False
@@ -86,8 +89,11 @@ class Leave:
 
 @dataclass(frozen=True)
 class PlanChecked:
-    """Result of a plan check: `refusal` is the reason if the plan is refused; sizes are in bytes, `duration` in
-    seconds.
+    """Result of a plan check.
+
+    refusal : reason for the refusal of the plan; None if it is accepted.
+    duration : expected duration [s]; None if not predicted.
+    needed, free : disk space for the data file, and free disk space [B]; None if the duration is unknown.
     """
 
     margins: tuple[Margin, ...]
@@ -102,8 +108,11 @@ class PlanChecked:
 
 @dataclass(frozen=True)
 class Attached:
-    """First message to a client that attaches to a session: its `run`, the operator's name (may be empty), the `owner`,
-    "window" or "terminal", and the time since the run was started [s].
+    """First message to a client that attaches to a session.
+
+    operator : name of the operator; may be empty.
+    owner : "window" or "terminal".
+    elapsed : time since the run was started [s].
     """
 
     run: Run
@@ -123,9 +132,14 @@ class Control:
 
 @dataclass(frozen=True)
 class Opened:
-    """The rig is open: the names of its channels, its sample rate [1/s], and the description of its devices. `further`
-    are the signals that follow those of `bench.app.ipc.messages.TRACES` in every block of traces. `duration` is the
-    expected length of the run [s], None if not predicted; `prediction` and `margins` are those of the plan.
+    """The rig is open.
+
+    channels : names of its channels.
+    sample_rate : sample rate [1/s].
+    devices : description of its devices.
+    further : signals that follow those of `bench.app.ipc.messages.TRACES` in every block of traces.
+    duration : expected duration of the run [s]; None if not predicted.
+    prediction, margins : prediction and margins of the plan.
     """
 
     channels: tuple[str, ...]
@@ -157,7 +171,7 @@ class Published:
 
 @dataclass(frozen=True)
 class Question:
-    """The plan waits for a person, whose answer must carry the same `number`."""
+    """The plan waits for a person; the answer must contain the same `number`."""
 
     number: int
     request: str
@@ -173,11 +187,13 @@ class SafetyInputs:
 
 @dataclass(frozen=True, eq=False)
 class Traces:
-    """Signals of one block: `low` and `high` have shape (n_bins, n_signals), extremes in bins of `step` seconds.
+    """Signals of one block: those of `bench.app.ipc.messages.TRACES`, then the further ones of the rig.
 
-    The first bin begins at bench time `begin` [s]; the signals are `bench.app.ipc.messages.TRACES`. `read` is the time
-    [s] of the computer's clock (`drivers.clock.now`) when the block had been read, `origin` the bench time of the run's
-    first sample [s]. `magnitudes` are those of `bench.events.Acquired`.
+    begin, step : bench time at the start of the first bin, and length of a bin [s].
+    low, high : minimum and maximum of each signal in each bin, shape (n_bins, n_signals).
+    read : time on the computer's clock (`drivers.clock.now`) at which the block had been read [s].
+    origin : bench time of the run's first sample [s].
+    magnitudes : those of `bench.events.Acquired`.
     """
 
     run: int
@@ -192,9 +208,12 @@ class Traces:
 
 @dataclass(frozen=True)
 class Beat:
-    """Heartbeat of the session process: state of the engine, bench time [s], numbers of events and of trace blocks lost
-    because the client did not read them, and time since the engine's last event [s]. While the rig is armed, the engine
-    publishes every block.
+    """Heartbeat of the session process. While the rig is armed, the engine publishes every block.
+
+    state, reason : state of the engine, and reason for its last change.
+    time : bench time [s].
+    lost_events, lost_traces : numbers of events and of blocks of traces lost because the client did not read them.
+    quiet : time since the engine's last event [s].
     """
 
     state: State
@@ -207,9 +226,12 @@ class Beat:
 
 @dataclass(frozen=True)
 class Ended:
-    """The run has ended and its files are written; `summary` can be converted to JSON, `table` is plain text. `passed`
-    is the verdict of a protocol that tests the bench, and True for any other protocol. `cause` is unknown if only the
-    files report the end.
+    """The run has ended and its files are written.
+
+    summary : contents of the summary file, which can be converted to JSON.
+    table : plain text.
+    passed : verdict of a protocol that tests the bench; True for any other protocol.
+    cause : cause of the end; unknown if only the files report the end.
     """
 
     status: str
@@ -223,8 +245,11 @@ class Ended:
 
 @dataclass(frozen=True)
 class Refused:
-    """The request was refused or, if `failed`, the session failed: `text` is the message, `cause` the cause, if known.
-    `details` are for developers and may be long.
+    """The request was refused or, if `failed`, the session failed.
+
+    text : error message.
+    cause : cause, if known.
+    details : information for developers; may be long.
     """
 
     text: str

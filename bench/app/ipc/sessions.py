@@ -21,8 +21,13 @@ FOLDER = "ROCKBENCH_SESSIONS"
 
 @dataclass(frozen=True)
 class RunningSession:
-    """A session to which a client can attach: process, address and key of its listener, and its run. `real` is True for
-    a bench with hardware; `began` is in seconds since 1970.
+    """A session to which a client can attach, and its run.
+
+    process : identifier of the process.
+    address, key : address and key of the session's listener.
+    owner : "window" or "terminal".
+    real : True for a bench with hardware.
+    began : time of the start [s since 1970].
     """
 
     process: int

@@ -101,7 +101,7 @@ class Owner:
     def __init__(self, path: Path, who: str) -> None:
         from filelock import FileLock, Timeout
 
-        # the existence of a file would not do as a lock, because the file would outlive a crashed program
+        # the existence of a file cannot serve as a lock, because the file would outlive a crashed program
         self._lock = FileLock(
             path.with_name(f"{path.name}.lock"), blocking=False, thread_local=False, fallback_to_soft=False
         )

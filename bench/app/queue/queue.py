@@ -43,11 +43,13 @@ class Queued(Parameters):
     parameters: dict[str, Any] = quantity(
         {}, "", "parameters of the protocol, as in a protocol file; defaults may be omitted"
     )
-    out: str | None = quantity(None, "", "folder for the results; if absent, a new one is named when the test starts")
+    out: str | None = quantity(
+        None, "", "folder for the results; if absent, a new folder is chosen when the test starts"
+    )
     operator: str = quantity("", "", "name of the operator")
     note: str = quantity("", "", "note for the data file")
     realtime: bool = quantity(False, "", "whether the simulated bench runs in real time")
-    ask: bool = quantity(False, "", "whether a person confirms tasks even if the bench can perform them")
+    ask: bool = quantity(False, "", "whether a person confirms operator tasks even if the bench can perform them")
     unattended: bool = quantity(False, "", "whether every question is answered yes, as with --yes")
     keep_going: bool = quantity(False, "", "whether the test continues to its end if the window closes")
     stage: Stage = quantity(Stage.WAITING, "", "status")
@@ -130,7 +132,7 @@ class Queue:
     def repeat(self, index: int, times: int = 1) -> None:
         """Insert copies below a test of any status; each copy is pending and has a separate folder."""
         if not 1 <= times <= MOST_COPIES:
-            raise InvalidInput("times", times, f"an integer from 1 to {MOST_COPIES}")
+            raise InvalidInput("times", times, f"it must be an integer from 1 to {MOST_COPIES}")
         original, folders = self._tests[index], {test.out for test in self._tests}
         copies: list[Queued] = []
         for _ in range(times):
@@ -223,7 +225,7 @@ def all_ready(tests: Sequence[Queued], configuration: "BenchConfiguration") -> M
 
 
 def room_refusal(found: Iterable["DiskSpace | None"]) -> InvalidInput | None:
-    """Reason why the tests together do not fit on the disk, which they are assumed to share, or None."""
+    """Error if the data files of all tests do not fit on the disk, which they are assumed to share; else None."""
     rooms = [room for room in found if room is not None]
     needed, free = sum(room.needed for room in rooms), min((room.free for room in rooms), default=0)
     if needed <= free:

@@ -25,7 +25,7 @@ from sim.loading import load_model
 from sim.specimen import Specimen
 
 Named = tuple[str, Statement]
-"""Number of a statement, and the statement."""
+"""A statement with its number."""
 
 
 def verdicts_table(named: Sequence[Named]) -> Table:
@@ -56,8 +56,8 @@ MODES_BETAS = (0.25, 0.40, 0.64, 0.97)
 
 @dataclass(frozen=True, eq=False)
 class PaperRequest:
-    """The requested `parts`, for the paper's or another specimen, under the given records. `band` [Hz], LOW:HIGH, is
-    the table's; gains are predicted for unfiltered records and for records limited to the band.
+    """Requested `parts` of the report, the specimen (the paper's or another) and the earthquake records. `band` is the
+    band of the table [Hz] as LOW:HIGH; gains are predicted for unfiltered records and for records limited to the band.
     """
 
     specimen: Specimen

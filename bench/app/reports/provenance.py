@@ -20,9 +20,9 @@ SHORT = 10
 UNKNOWN = "unknown"
 
 EXACT = 10
-"""Significant digits of a parameter, enough to reproduce it as typed."""
+"""Number of significant digits of a parameter, enough to reproduce it as typed."""
 
-_DEVICES = {"backend": "kind of bench", "seed": "seed of every random number"}
+_DEVICES = {"backend": "kind of bench", "seed": "seed of the random numbers"}
 """Entries of a bench description that are not devices."""
 
 

@@ -35,7 +35,9 @@ _SHOWN = 5e-3
 def specimen_section(
     specimen: Specimen, uncertainty: SpecimenUncertainty | None, identified: Identified | None = None
 ) -> Section:
-    """Parameters of frame, block and spring, and the identified properties; treated as exact without `uncertainty`."""
+    """Report section on the parameters of frame, block and spring, and on the identified properties. Without
+    `uncertainty`, the parameters are treated as exact.
+    """
     text = (
         "A two-storey shear frame, with its first storey coupled by a spring to a rigid block that rocks on its base. "
         "Every prediction in this report was computed from these values."
@@ -144,7 +146,7 @@ def _parameters(specimen: Specimen, uncertainty: SpecimenUncertainty | None, mea
             )
     if uncertainty is not None:
         half = f"± {100.0 * uncertainty.spring:g} %"
-        others = " that was not measured" if any(spring_label(name) for name in measured) else ""
+        others = " if it was not measured" if any(spring_label(name) for name in measured) else ""
         rows.append(["k_C", "spring", f"stiffness of the spring{others}", "β k₁", "N/m", half])
     columns = [
         Column("symbol", words=True),

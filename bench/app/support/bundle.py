@@ -20,7 +20,7 @@ from bench.unfinished import write_new
 LAST = 60.0
 """Duration of the data taken from the end of the file [s]."""
 PERSONAL = ("operator", "notes", "file", "journal")
-"""Keys whose values name people or places."""
+"""Keys whose values contain names of people or paths."""
 REMOVED = "(removed)"
 _PATH = re.compile(r"(?:[A-Za-z]:\\|\\\\|/)[^\s\"',;:*?<>|]+")
 

@@ -20,7 +20,7 @@ OLDEST = (3, 11)
 RESOLUTION = 1e-4
 """Coarsest acceptable step of the computer's clock [s]."""
 LATE = 0.005
-"""Largest acceptable delay of a sleep of 1 ms, given the length of a block of samples [s]."""
+"""Largest acceptable delay of a sleep of 1 ms [s]; it must be short compared with a default block of samples."""
 SPEED = 20e6
 """Minimum write speed of the disk [B/s]: many times that required by a run."""
 ROOM = 5e9
@@ -40,7 +40,7 @@ class Health(StrEnum):
 
 @dataclass(frozen=True)
 class Finding:
-    """A line of the report: the checked item, its health, the finding and the remedy."""
+    """A line of the report: the checked item, the result of the check, the observation and the remedy."""
 
     item: str
     health: Health
@@ -231,7 +231,7 @@ def device_server(address: str) -> Finding:
     host, _, port = address.rpartition(":")
     try:
         with socket.create_connection((host, int(port)), timeout=2.0):
-            return Finding("device server", Health.GOOD, f"{address} answers")
+            return Finding("device server", Health.GOOD, f"{address} responds")
     except (OSError, ValueError, OverflowError) as error:
         remedy = "start the device server on that computer, and open its port in the firewall"
         return Finding("device server", Health.BAD, f"{address} does not respond ({error})", remedy)

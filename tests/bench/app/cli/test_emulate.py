@@ -147,4 +147,4 @@ def test_a_file_is_never_overwritten_and_hardware_is_not_emulated(
     assert main(["emulate", "--write", str(file)]) == 2
     assert "never overwritten" in capsys.readouterr().err
     assert main(["emulate", "--config", str(file)]) == 2
-    assert "must be the simulated bench, which the emulated laboratory uses" in capsys.readouterr().err
+    assert 'it must be "simulated"' in capsys.readouterr().err
