@@ -57,8 +57,10 @@ _OF_BRANCH = {
 @dataclass(frozen=True, eq=False)
 class Branch:
     """A branch of steady motions; arrays of shape (n_beta, n_omega), NaN where the motion does not exist. An axis
-    specified by a single number is dropped. The band `alpha_2_low` to `alpha_2_high` is NaN unless requested.
-    `multiplier` is the greatest |Floquet multiplier|.
+    specified by a single number is dropped.
+
+    alpha_2_low, alpha_2_high : uncertainty band of alpha_2; NaN unless requested.
+    multiplier : greatest |Floquet multiplier|.
     """
 
     alpha_1: Quantity
@@ -102,10 +104,12 @@ class SeismicPrediction:
 
 @dataclass(frozen=True, eq=False)
 class Modes:
-    """Undamped modes: `omega` of shape (n_beta, 3), `shapes` of shape (n_beta, 3, 3), the last axis u1, u2, theta.
+    """Undamped modes; the last axis of the shapes is u1, u2, theta. The first axis of `omega` and `shapes` is dropped
+    for a single stiffness.
 
-    A negative entry of `omega` is the growth rate of a divergent mode. `bare_omega`, shape (2,), and `bare_shapes`,
-    shape (2, 2), are those of the bare frame. The first axis is dropped for a single stiffness.
+    omega : circular frequencies, shape (n_beta, 3); a negative entry is the growth rate of a divergent mode.
+    shapes : mode shapes, shape (n_beta, 3, 3).
+    bare_omega, bare_shapes : those of the bare frame, of shapes (2,) and (2, 2).
     """
 
     beta: Quantity

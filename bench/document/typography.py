@@ -20,10 +20,10 @@ _SYMBOLS = {
     "u2": "u₂",
 }
 _WORDS = re.compile(rf"(?<![\w.`-])({'|'.join(_SYMBOLS)})(?![\w:`]|\.\w)")
-"""Stand-alone symbols, not part of a key, flag or file name."""
+"""Stand-alone symbols, which are not part of a key, flag or file name."""
 
 _UNIT = re.compile(r"(?:(?<=/s)2|(?<=/m)[23]|(?<=kg m)2)(?!\w|\.\d)")
-"""Powers within a unit; m2 alone may be a mass."""
+"""Powers within a unit; m2 alone is excluded because it may be a mass."""
 
 _POWER = re.compile(r"(?<=[a-z])([23])(?!\d)")
 _RAISED = {"2": "²", "3": "³"}

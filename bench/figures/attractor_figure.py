@@ -20,7 +20,7 @@ def attractor_figure(points: Mapping[str, NDArray[Any]], gains: Sequence[NDArray
     """Gains of long-term motions against frequency. A dot is the peak of a cycle; the line is the orbit, dashed where
     it is unstable on the shake table.
 
-    `points` are the arrays of the table from `bench.prediction.attractors`; `gains` are those of the last cycles for
+    `points` are the columns of the table from `bench.prediction.attractors`; `gains` are those of the last cycles for
     each of its rows, empty after a fall.
     """
     betas = np.unique(points["beta"])

@@ -16,7 +16,7 @@ WIDTH, ROW, LEGEND = 6.8, 1.7, 0.8
 """Width of the figure, height of a panel, height of legend and axis [inch]."""
 
 LINES = ((BLUE, "-", 1.4), (VERMILLION, "--", 1.0), (BLACK, ":", 1.0), (GREEN, "-.", 1.0), (PURPLE, "-", 0.8))
-"""Colour, dash and width of the curves of a panel, in order."""
+"""Colour, dash and width of each curve of a panel, in order."""
 
 POWERS = str.maketrans({"2": "²", "3": "³"})
 

@@ -25,7 +25,7 @@ BAY = 0.36
 """Drawn width of the frame relative to its height; the model does not define a width."""
 
 LIFT = 0.02
-"""Height of an arrow above the displaced point [m]."""
+"""Vertical offset of an arrow from the displaced point [m]."""
 
 Shape = tuple[float, float, float]
 """u1, u2 (any unit) and theta [rad per that unit]; NaN without a block."""

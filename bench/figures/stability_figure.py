@@ -21,7 +21,7 @@ Values = Mapping[str, NDArray[Any]]
 def stability_figure(points: Values, boundaries: Values) -> "Figure":
     """Slowest multiplier against frequency; a circle marks a stability boundary.
 
-    `points` and `boundaries` are the arrays of the tables from `bench.prediction.stability`.
+    `points` and `boundaries` are the columns of the tables from `bench.prediction.stability`.
     """
     betas = sorted({float(beta) for beta in points["beta"]})
     across = min(COLUMNS, len(betas))

@@ -69,9 +69,10 @@ def gain_maps(n: int, runs: int, repetitions: int) -> Section:
     overturned = sum(motion.overturned is not None for motion in motions)
     notes = (
         "Orbits: both branches, peaks and Floquet multipliers. Runs: peaks of the last 20 periods; "
-        f"{overturned} of {ran} overturn early and cost less. A run reproduces the orbit if its alpha_2 is within 2 %.",
+        f"{overturned} of {ran} overturn early and cost less. A run reproduces the orbit if its alpha_2 differs from "
+        "that of the orbit by less than 2 %.",
         "Error of the orbits: greatest relative difference from the peaks of one period integrated by dop853 at "
-        "1e-13 from the start of the orbit, at nine points from corner to corner.",
+        "1e-13 from the start of the orbit, at nine points spread over the map.",
     )
     error = rows[0]["error"]
     # the cost per point of a coarser map differs, so its time cannot be scaled to the full map
@@ -149,7 +150,7 @@ def records(quick: bool, members: int) -> Section:
     notes = (
         f"Records of {DURATION:g} s at dt {DT:g} s, all computed with peaks. Errors of end states in SI units.",
         f"In the scatter case, {overturned} of {members} members overturn; the error is the greatest relative "
-        "difference in peak drift over the first members.",
+        "difference in peak drift over the first five members.",
     )
     targets = (
         Target("40 s record at rest", 0.3, 1e3 * rest.minimum, "ms"),

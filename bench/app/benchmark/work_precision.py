@@ -194,11 +194,11 @@ COLUMNS = (
 NOTES = (
     "Errors: greatest deviation of the end state from the reference, in SI units (components reach about 1); errors "
     "of the peaks are relative. The reference is heyoka in 80-bit arithmetic, an independent integrator.",
-    "First call: compilation or loading of the compiled code, and a tenth of a second of motion (none for CVODE). It "
-    "is excluded from the times; the methods run in turn. Only rows with an error of the peaks compute peaks; the "
-    "others do less work.",
+    "First call: compilation or loading of the compiled code, and a tenth of a second of motion (none for CVODE); it "
+    "is excluded from the other times. The methods run in turn. Only rows with an error of the peaks compute peaks; "
+    "the others do less work.",
     'scipy and CVODE call the compiled equations; "Python" marks uncompiled equations, the usual practice.',
-    "A method with a different number of impacts has missed or doubled one: its time is meaningless.",
+    "A method with a different number of impacts has missed an impact or counted one twice: its time is meaningless.",
 )
 
 

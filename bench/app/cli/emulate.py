@@ -34,10 +34,10 @@ def emulate(
     config: Annotated[
         Path | None, Parameter(metavar="FILE", help="Configuration that provides specimen, limits and simulation.")
     ] = None,
-    lasers: Annotated[Literal["serial", "analogue"], Parameter(help="How the lasers are connected.")] = "serial",
+    lasers: Annotated[Literal["serial", "analogue"], Parameter(help="Connection of the lasers.")] = "serial",
     device: Annotated[
         Literal["usb", "crio", "cDAQ-9174", "cDAQ-9185", "cRIO-9045", "cRIO-9049", "PCIe-6351", "USB-6351"],
-        Parameter(help="DAQ device: USB-6363 (usb), cRIO-9045 with NI 9239 (crio), or by its name."),
+        Parameter(help="DAQ device: usb (USB-6363), crio (cRIO-9045 with NI 9239), or the name of another device."),
     ] = "usb",
     modules: Annotated[
         tuple[str, ...] | None,
@@ -205,7 +205,9 @@ def _hand_out(configuration: "BenchConfiguration", laboratory: "Laboratory", pat
 
 @contextmanager
 def _until_asked() -> Generator[threading.Event]:
-    """Event that Ctrl-C, SIGTERM and the closing of the terminal set instead of their default actions."""
+    """Context manager that yields an event. Ctrl-C, SIGTERM and the closing of the terminal set it instead of ending
+    the process.
+    """
     over = threading.Event()
 
     def handle(number: int, frame: FrameType | None) -> None:  # noqa: ARG001 - the signature is Python's

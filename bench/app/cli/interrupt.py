@@ -93,10 +93,11 @@ class RunInterrupts(Interrupts):
 
 @contextmanager
 def interruptible(requests: "Requests", asking: Callable[[], bool]) -> Generator[Interrupts, None, None]:
-    """Turn SIGINT, SIGTERM and a closed terminal into `requests`: the first an abort, the next a halt.
+    """Context manager that turns SIGINT, SIGTERM and a closed terminal into `requests`: the first one requests an
+    abort, the next a halt.
 
-    The handler also raises the exception of `requests.breaking`, which ends the planning of a run; and
-    KeyboardInterrupt while a question to the operator is open (`asking`), because Python would resume the wait for the
+    The handler also raises the exception of `requests.breaking`, which ends the planning of a run. While a question to
+    the operator is open (`asking`), it raises KeyboardInterrupt, because Python would otherwise resume the wait for the
     answer. Has no effect outside the main thread, where Python does not allow signal handlers.
     """
     interrupts = RunInterrupts(requests, asking)
@@ -210,7 +211,7 @@ def handle_signals(interrupts: Interrupts) -> None:
 
 
 def interrupted_text(text: str = "interrupted", otherwise: str = "") -> str:
-    """Message for an interrupt: `text` and the files that are complete, or `otherwise` if there are none."""
+    """Message for an interrupt: `text` with the files that are complete, or with `otherwise` if there are none."""
     kept = ", ".join(map(str, completed()))
     if not kept:
         return f"{text}; {otherwise}" if otherwise else text

@@ -101,8 +101,8 @@ FIGURES = (".png", ".pdf", ".svg")
 class Result:
     """A result in every form of output; each form is created only when requested.
 
-    CSV contains the first of the `tables`, JSON `content` and `metadata`. `write` replaces the HDF5 file of --out;
-    `close` is called when all files have been written.
+    CSV contains the first of the `tables`, JSON `content` and `metadata`. `write`, if given, writes the file of --out
+    instead of the usual HDF5 file; `close` is called when all files have been written.
     """
 
     title: str

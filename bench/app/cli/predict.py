@@ -66,7 +66,7 @@ _Records = Annotated[
 
 @dataclass(frozen=True)
 class Subject:
-    """Specimen of a prediction and its uncertainty; the bench and the records are used only under records."""
+    """Specimen of a prediction and its uncertainty; for a prediction under records, also the bench and the records."""
 
     specimen: "Specimen"
     known: "SpecimenKnowledge"

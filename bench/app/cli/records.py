@@ -26,10 +26,12 @@ SHORTEST, LONGEST = 0.05, 5.0
 def info(
     *files: RecordText,
     dt: Annotated[
-        str | None, Parameter(metavar="SECONDS", help="Time step, for files that do not state it.", show_default=False)
+        str | None,
+        Parameter(metavar="SECONDS", help="Time step [s], for files that do not state it.", show_default=False),
     ] = None,
     unit: Annotated[
-        str | None, Parameter(metavar="UNIT", help="Unit, for files that do not state it.", show_default=False)
+        str | None,
+        Parameter(metavar="UNIT", help="Unit of the samples, for files that do not state it.", show_default=False),
     ] = None,
     channel: Annotated[
         str | None, Parameter(metavar="CHANNEL", help="Channel, by number or name, for files that have several.")

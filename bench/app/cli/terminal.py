@@ -81,8 +81,8 @@ class LogLines(PlainLines):
 def progress_on(
     stream: TextIO, person_answers: bool, protocol: "Protocol[Any] | None" = None
 ) -> "LiveConsole | PlainLines":
-    """The log for a `protocol` that has a log format; else the live display if `stream` is a terminal that can redraw,
-    or plain lines.
+    """Display of the progress: the log of a `protocol` that has a log format, else the live display on a terminal that
+    can redraw, else plain lines.
     """
     if protocol is not None and protocol.log_line is not None:
         return LogLines(stream, protocol)

@@ -10,7 +10,9 @@ PERIOD = 1000
 
 
 class SessionWatch(QObject):
-    """Searches for sessions while the window has no run; the first search attaches to a session that is under way."""
+    """Searches for sessions while the window has no run. The first search also attaches the window to a session under
+    way, if any.
+    """
 
     def __init__(self, controller: Controller, parent: QObject) -> None:
         super().__init__(parent)

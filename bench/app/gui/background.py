@@ -20,7 +20,7 @@ BELOW_NORMAL = 0x4000
 
 class Reader(QObject):
     """Calls functions in a thread, one at a time; `found` emits the result of the last call only, in the window's
-    thread. The functions must only compute; the slots of `found` do the drawing.
+    thread. The functions may only compute; the slots of `found` draw.
     """
 
     found = Signal(object)

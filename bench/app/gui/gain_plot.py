@@ -149,8 +149,8 @@ class GainPlot(pg.PlotWidget):
         return [{"pos": (x, self._place(mark.gain)), "symbol": symbol, "size": 11, "pen": pen, "brush": brush}]
 
     def add_all(self, points: Sequence[Mapping[str, Any]], run: int = 0, name: str = "") -> None:
-        """Draw the points of a run, called `name` in the legend. Points of a quantity other than that of the axis are
-        not drawn; the legend states this.
+        """Draw the points of a run, called `name` in the legend. Points whose abscissa is not that of the axis are not
+        drawn; the legend states this.
         """
         before = len(self._marks)
         self._draw([(point, run) for point in points])

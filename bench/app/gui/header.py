@@ -45,8 +45,9 @@ class StopButton(QPushButton):
 
 
 class StopFilter(QObject):
-    """Receives key and mouse events before every widget and dialog of the application. A shortcut does not receive the
-    key behind a modal dialog, and a press on `button` while a list is open would only close the list.
+    """Receives key and mouse events before every widget and dialog of the application. This is necessary because a
+    shortcut does not receive the key while a modal dialog is open, and a press on `button` while a list is open would
+    only close the list.
     """
 
     def __init__(self, controller: Controller, button: StopButton) -> None:

@@ -24,7 +24,7 @@ _ARMING = (
 )
 _NOT_CHECKED = "No sensor detects whether this task is done, so make sure before you answer. {what}"
 UNKNOWN_TASK = (
-    f"An operator task. {_AT_ZERO}",
+    f"The plan requires this task. {_AT_ZERO}",
     "The safety inputs are checked whenever the rig is armed. No sensor detects whether this task is done, so make "
     "sure before you answer.",
 )

@@ -84,7 +84,7 @@ class Measured:
 def rows_of(
     results: Mapping[str, Column], points: Sequence[Mapping[str, Any]], labels: Mapping[str, str] = NO_LABELS
 ) -> list[Measured]:
-    """Quantities of all points: those with an uncertainty, or where there is none, every number. `labels` are the
+    """Quantities of all points: the fields with an uncertainty or, if no field has one, every number. `labels` are the
     printed names of fields.
     """
     stems = {name: without_unit(name, column.unit) for name, column in results.items()}

@@ -46,7 +46,7 @@ class QueueRunner(QObject):
         self.going = False
         """Whether the next test begins after the current one."""
         self.why = ""
-        """Reason why the queue was paused; empty if there was no problem."""
+        """Reason for the pause of the queue; empty unless a problem caused it."""
         try:
             self.queue = Queue() if store is None else Queue(store.read(), store.write)
         except RockbenchError:

@@ -169,7 +169,7 @@ class ResultsPage(QWidget):
             self._say(text.format(text=ended.text), "alarm")
 
     def show_file(self, path: Path, *, place: Place = Place.TOO) -> None:
-        """Open a data file; after a read error, which is reported, the page stays unchanged."""
+        """Open a data file; a read error is reported and leaves the page unchanged."""
         try:
             file = read_file(path)
         except (RockbenchError, OSError) as error:

@@ -52,7 +52,7 @@ from bench.protocol import Protocol
 GAINS_HEIGHT, LOWEST = 150, 540
 """Minimum heights [px] of the protocol's plot, for a readable axis, and of the page, for a complete picture."""
 OLD = 0.5
-"""Age of the newest sample above which the age is shown during a run [s]."""
+"""Age of the newest sample [s] above which this age is shown during a run."""
 SHARES = (20, 50, 30)
 """Widths of meters, verdict with plot, and picture with traces, in per cent."""
 

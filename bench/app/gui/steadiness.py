@@ -33,8 +33,8 @@ ACCELERATION, DISPLACEMENT, U1, U2 = (TRACES.index(name) for name in ("accelerat
 
 class SensorSteadiness:
     """Cuts traces into cycles of `omega` [rad/s] and evaluates each of `SENSORS` separately. `tolerance` [1] and
-    `jitter` [rad] are those of `bench.analysis.steady.SteadyDetector`; with `beside_table` the lasers are mounted on
-    the ground and also measure the table's displacement.
+    `jitter` [rad] are those of `bench.analysis.steady.SteadyDetector`; with `beside_table`, the lasers are mounted on
+    the ground and therefore also measure the table's displacement.
     """
 
     def __init__(self, omega: float, tolerance: float, jitter: float, *, beside_table: bool) -> None:

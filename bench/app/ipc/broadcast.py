@@ -117,7 +117,7 @@ class Broadcast:
 
     @property
     def heard(self) -> bool:
-        """Whether there is a client."""
+        """Whether the session has a client."""
         return bool(self._queues)
 
     def put(self, message: FromSession, *, always: bool = False) -> None:

@@ -137,7 +137,9 @@ class ClientConnection:
                 connection.send(message)
 
     def _end_unheard(self, text: str, details: str, *, by_files: bool = True) -> None:
-        """Report a session that ended without a final message: from its files if it wrote them, else with `text`."""
+        """Report the end of a session that sent no final message: from its files if it wrote them, else with `text` as
+        the reason.
+        """
         if self._over:
             return
         if by_files and (ended := self._by_the_files()) is not None:

@@ -84,7 +84,7 @@ class Alive:
 
 @dataclass(frozen=True)
 class Leave:
-    """The client is disconnecting in an orderly way."""
+    """The client disconnects in an orderly way."""
 
 
 @dataclass(frozen=True)

@@ -44,7 +44,7 @@ from drivers.rig import Rig, RigError
 from sim import waiting
 
 FAREWELL = 2.0
-"""Longest wait at the end for a client that does not read its messages [s]."""
+"""Longest wait at the end of the session for a client that does not read its messages [s]."""
 
 PERIOD = 0.5
 """Shortest interval between readings of the safety inputs for the display [s]. The guard reads them in every block."""

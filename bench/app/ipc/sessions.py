@@ -82,7 +82,7 @@ def running_sessions() -> list[RunningSession]:
 
 
 def lock_of(path: Path) -> FileLock:
-    """Lock of an announcement, on a separate file, since a locked file cannot be read on Windows."""
+    """Lock of an announcement; it is a separate file, since a locked file cannot be read on Windows."""
     return FileLock(path.with_suffix(".lock"), blocking=False, thread_local=False, fallback_to_soft=False)
 
 

@@ -32,7 +32,7 @@ def verdicts_table(named: Sequence[Named]) -> Table:
     """Table of verdicts, one row per statement."""
     columns = [Column("statement", words=True), Column("subject", words=True), Column("verdict", words=True)]
     rows = [[number, each.title, str(each.verdict)] for number, each in named]
-    caption = "Verdicts. As expected: a known and documented deviation of the model from the paper"
+    caption = 'Verdicts; "as expected" marks a known and documented deviation of the model from the paper'
     return Table(caption, columns, rows)
 
 
