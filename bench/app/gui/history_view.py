@@ -38,8 +38,8 @@ SETTLE = 150
 
 @dataclass(frozen=True, eq=False)
 class Stretch:
-    """Samples of a channel from `begin` to `end` [s] as a line through the minimum and maximum of each part in turn.
-    Both arrays have shape (n,); values are in the channel's unit.
+    """Samples of a channel from `begin` to `end` [s] as a line through the minimum and the maximum of each of its
+    parts in turn. Both arrays have shape (n,); values are in the channel's unit.
     """
 
     time: NDArray[np.float64]
