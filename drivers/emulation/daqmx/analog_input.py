@@ -2,64 +2,25 @@
 
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from math import ceil
 
 import numpy as np
-from nidaqmx.constants import DigitalWidthUnits, TerminalConfiguration
 from nidaqmx.error_codes import DAQmxErrors
 from numpy.typing import NDArray
 
 from drivers.emulation.daqmx.conversion import DeltaSigma, conversion_period
-from drivers.emulation.daqmx.device import CLOCK, START, AnalogInputs, DeviceModel, InputConverter, Seen, Wirings
+from drivers.emulation.daqmx.device import (
+    CLOCK,
+    START,
+    InputChannel,
+    Seen,
+)
 from drivers.emulation.daqmx.engines import EngineSlot
 from drivers.emulation.daqmx.errors import DaqmxFailure, NotEmulated
 from drivers.emulation.daqmx.timing import SampleClock, deadline_after, wait_until
 from drivers.emulation.plant import Plant
 from sim.channel import Counts
 from sim.errors import InvalidInput
-
-_WIRING_OF = {
-    TerminalConfiguration.RSE.value: Wirings.RSE,
-    TerminalConfiguration.NRSE.value: Wirings.NRSE,
-    TerminalConfiguration.DIFF.value: Wirings.DIFFERENTIAL,
-    TerminalConfiguration.PSEUDO_DIFF.value: Wirings.PSEUDODIFFERENTIAL,
-}
-
-
-@dataclass
-class FilterDelay:
-    """Settings of a converter with properties for its delay: whether whole samples of the delay are removed, and the
-    unit of the delay.
-    """
-
-    removed: bool = True
-    units: int = DigitalWidthUnits.SAMPLE_CLOCK_PERIODS.value
-
-
-@dataclass(frozen=True)
-class InputChannel:
-    """One channel of an input task."""
-
-    name: str
-    device: DeviceModel
-    inputs: AnalogInputs
-    terminal: int
-    minimum: float
-    maximum: float
-    converter: InputConverter
-    filter: FilterDelay = field(default_factory=FilterDelay)
-
-
-def require_wiring(inputs: AnalogInputs, wiring: int) -> None:
-    """Raise DaqmxFailure for an unsupported wiring of an input."""
-    if wiring != TerminalConfiguration.DEFAULT.value and not inputs.wirings & _WIRING_OF.get(wiring, Wirings(0)):
-        raise DaqmxFailure(
-            DAQmxErrors.INVALID_ATTRIBUTE_VALUE,
-            "Requested value is not a supported value for this property.\n\n"
-            f"Property: AI.TermCfg\nRequested Value: {wiring}",
-        )
-
 
 _AUTOMATIC_BUFFER = ((100.0, 1_000), (10_000.0, 10_000), (1.0e6, 100_000), (float("inf"), 1_000_000))
 """Sizes of the driver's default buffer in samples per channel, with the highest sample rate for each (NI-DAQmx help,

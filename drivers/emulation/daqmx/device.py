@@ -6,10 +6,12 @@ from enum import IntFlag
 from types import MappingProxyType
 
 import numpy as np
-from nidaqmx.constants import ProductCategory
+from nidaqmx.constants import DigitalWidthUnits, ProductCategory, TerminalConfiguration
+from nidaqmx.error_codes import DAQmxErrors
 from numpy.typing import NDArray
 
 from drivers.emulation.daqmx.conversion import DeltaSigma
+from drivers.emulation.daqmx.errors import DaqmxFailure
 from sim.sensors import Converter
 
 _STRAIGHT: Mapping[int, tuple[float, ...]] = MappingProxyType({})
@@ -191,3 +193,45 @@ def _polynomial(coefficients: Sequence[float], x: NDArray[np.float64]) -> NDArra
     for c in reversed(coefficients):
         value = value * x + c
     return value
+
+
+_WIRING_OF = {
+    TerminalConfiguration.RSE.value: Wirings.RSE,
+    TerminalConfiguration.NRSE.value: Wirings.NRSE,
+    TerminalConfiguration.DIFF.value: Wirings.DIFFERENTIAL,
+    TerminalConfiguration.PSEUDO_DIFF.value: Wirings.PSEUDODIFFERENTIAL,
+}
+
+
+@dataclass
+class FilterDelay:
+    """Settings of a converter with properties for its delay: whether whole samples of the delay are removed, and the
+    unit of the delay.
+    """
+
+    removed: bool = True
+    units: int = DigitalWidthUnits.SAMPLE_CLOCK_PERIODS.value
+
+
+@dataclass(frozen=True)
+class InputChannel:
+    """One channel of an input task."""
+
+    name: str
+    device: DeviceModel
+    inputs: AnalogInputs
+    terminal: int
+    minimum: float
+    maximum: float
+    converter: InputConverter
+    filter: FilterDelay = field(default_factory=FilterDelay)
+
+
+def require_wiring(inputs: AnalogInputs, wiring: int) -> None:
+    """Raise DaqmxFailure for an unsupported wiring of an input."""
+    if wiring != TerminalConfiguration.DEFAULT.value and not inputs.wirings & _WIRING_OF.get(wiring, Wirings(0)):
+        raise DaqmxFailure(
+            DAQmxErrors.INVALID_ATTRIBUTE_VALUE,
+            "Requested value is not a supported value for this property.\n\n"
+            f"Property: AI.TermCfg\nRequested Value: {wiring}",
+        )

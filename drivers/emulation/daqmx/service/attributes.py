@@ -13,8 +13,9 @@ from nidaqmx.constants import (
 )
 from nidaqmx.error_codes import DAQmxErrors
 
-from drivers.emulation.daqmx.analog_input import AnalogInput, FilterDelay, InputChannel
+from drivers.emulation.daqmx.analog_input import AnalogInput
 from drivers.emulation.daqmx.analog_output import TRANSFER_CONDITIONS, AnalogOutput, OutputChannel
+from drivers.emulation.daqmx.device import FilterDelay, InputChannel
 from drivers.emulation.daqmx.errors import DaqmxFailure
 from drivers.emulation.daqmx.lines import DigitalInput, DigitalOutput
 from drivers.emulation.daqmx.models import unflattened

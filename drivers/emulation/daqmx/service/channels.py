@@ -9,9 +9,9 @@ from nidaqmx.constants import (
 )
 from nidaqmx.error_codes import DAQmxErrors
 
-from drivers.emulation.daqmx.analog_input import AnalogInput, InputChannel, require_wiring
+from drivers.emulation.daqmx.analog_input import AnalogInput
 from drivers.emulation.daqmx.analog_output import AnalogOutput, OutputChannel
-from drivers.emulation.daqmx.device import InputConverter
+from drivers.emulation.daqmx.device import InputChannel, InputConverter, require_wiring
 from drivers.emulation.daqmx.errors import DaqmxFailure
 from drivers.emulation.daqmx.lines import DigitalInput, DigitalOutput, Line, LineChannel
 from drivers.emulation.daqmx.models import unflattened
