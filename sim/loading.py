@@ -14,7 +14,7 @@ from pathlib import Path
 from threading import Event, Thread
 from typing import IO
 
-from sim.waiting import wait
+from sim.waiting import end, join, wait
 
 STEADY = {"roots": 6, "watching": 8, "steps": 3, "resting": 14, "members": 40}
 """Modules of `sim.kernel` used by predictions of steady motions, with their shares of the compilation time."""
@@ -83,9 +83,9 @@ def helped(names: Sequence[str]) -> Generator[Mapping[str, Event], None, None]:
     try:
         yield ready
     finally:
-        helper.kill()
-        helper.wait()
-        reader.join()
+        # a helper that is still at work is killed
+        end(helper, 0.0)
+        join(reader)
 
 
 def _listen(lines: IO[bytes], ready: Mapping[str, Event]) -> None:

@@ -12,6 +12,7 @@ from typing import Literal
 from bench.app.benchmark.section import Cell, Column, Section, Target
 from bench.unfinished import temporary_folder
 from sim.errors import RockbenchError
+from sim.waiting import end
 
 COLUMNS = (
     Column("command", "command"),
@@ -86,9 +87,7 @@ def _measured(arguments: Sequence[str], folder: Path) -> dict[str, Cell]:
         try:
             ended, processor, memory = _ended(process)
         finally:
-            if process.poll() is None:
-                process.kill()
-                process.wait()
+            end(process, 0.0)
         elapsed = time.perf_counter() - begin
         if ended != 0:
             messages.seek(0)
@@ -100,7 +99,8 @@ def _measured(arguments: Sequence[str], folder: Path) -> dict[str, Cell]:
 def _ended(process: "subprocess.Popen[bytes]") -> tuple[int, float | None, float | None]:
     """Exit code, processor time [s] and greatest memory [MB] of a process at its end."""
     if sys.platform == "win32":
-        return process.wait(), None, None
+        end(process, float("inf"))
+        return process.returncode, None, None
     _, status, usage = os.wait4(process.pid, 0)
     process.returncode = os.waitstatus_to_exitcode(status)
     per_mb = 2**20 if sys.platform == "darwin" else 2**10
