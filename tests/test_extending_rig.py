@@ -152,7 +152,7 @@ def test_the_plan_of_a_plug_in_runs_on_a_loop_back_rig() -> None:
 
 
 def test_its_table_is_shown_in_the_window(file: Path, qtbot: QtBot) -> None:
-    from bench.app.gui.form import ConfigurationTree
+    from bench.app.gui.configuration_tree import ConfigurationTree
 
     tree = ConfigurationTree()
     qtbot.addWidget(tree)
