@@ -203,9 +203,13 @@ class Campaign:
         stop: float | None = None,
     ) -> Samples:
         """Samples of a signal in SI units, relative to the zero of each run, with the calibration of the lasers
-        applied. Selects the `run` by number, the specimen (`coupled`: the label of a spring, True for any, False for
-        the bare frame) and the bench times from `start` up to but not including `stop` [s]. NaN where a sensor had no
-        valid value. Raises InvalidInput for an unknown signal or run.
+        applied; NaN where a sensor had no valid value. By default, samples of all runs.
+
+        run : number of the run.
+        coupled : label of a spring, True for any spring, or False for the bare frame.
+        start, stop : bench times [s] from `start` up to but not including `stop`.
+
+        Raises InvalidInput for an unknown signal or run.
         """
         if signal not in self.signals:
             raise InvalidInput("signal", signal, f"it must be one of {', '.join(self.signals)}")

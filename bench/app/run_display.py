@@ -12,7 +12,7 @@ from bench.events import Event, PointFinished, Progress, State, StateChanged, St
 from bench.live_values import Estimate, LiveValue, RunningGain, TwinEstimate
 
 NOTICES = 5
-"""Number of recent events that are displayed."""
+"""Number of the latest events that are displayed."""
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,9 @@ COLUMNS, WIDTH, ROW, LEGEND = 3, 3.4, 2.7, 0.9
 GAIN_HEADROOM = 1.15
 
 SHIFT = 0.006
-"""Offset of the prediction for the achieved motion from the measured point, as a fraction of the panel's width."""
+"""Horizontal offset of the prediction for the achieved motion from the measured point, as a fraction of the panel's
+width.
+"""
 
 HISTORY_WIDTH, HISTORY_ROW, HISTORY_LEGEND = 8.5, 1.55, 0.8
 """Dimensions of a figure of histories [inch]: width, height of a row, height of legend and axis."""

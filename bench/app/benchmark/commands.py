@@ -1,4 +1,6 @@
-"""Commands for which a person waits: elapsed time, processor time and memory of each in a process of its own."""
+"""Benchmark of commands for which a person waits: elapsed time, processor time and memory of each, in a separate
+process.
+"""
 
 import os
 import subprocess
@@ -24,7 +26,14 @@ COLUMNS = (
 
 @dataclass(frozen=True)
 class Waited:
-    """A command, with the limit of its time [s], elapsed or of the processor, and of its memory [MB]."""
+    """A command and the limits of its time and memory.
+
+    line : arguments of the command.
+    limit : maximum time [s].
+    of : the time to which `limit` applies, elapsed or processor time.
+    memory : maximum memory [MB]; None for no limit.
+    quick : whether the quick benchmark includes the command.
+    """
 
     line: str
     limit: float
@@ -41,7 +50,9 @@ COMMANDS = (
     Waited("predict map --omega 12:21:1000 --beta 0.1:1.2:1000 --out map.h5", 40.0, memory=1000.0),
     Waited("run earthquake --out campaign", 60.0),
 )
-"""The seven synthetic records: with 40 stiffnesses in `predict seismic`, with three springs in the campaign."""
+"""Commands under records use the seven synthetic ones: with 40 stiffnesses in `predict seismic`, with three springs in
+the campaign.
+"""
 
 
 def commands(quick: bool) -> Section:
@@ -63,7 +74,7 @@ def commands(quick: bool) -> Section:
             targets.append(Target(f"memory of {name}, 1000 x 1000", each.memory, measured, "MB"))
     notes = (
         "Each command runs once in a new process, with the compiled kernel but without results kept from earlier runs. "
-        "The targets of elapsed times hold for two processors without other load.",
+        "The targets for elapsed times apply to two processors without other load.",
     )
     return Section("commands", "Commands", COLUMNS, rows, notes, targets)
 

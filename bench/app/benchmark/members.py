@@ -26,7 +26,7 @@ COLUMNS = (
 OURS, THEIRS = "taylor", "heyoka, batch of 4"
 
 MEMBERS = 8
-"""Trajectories of a run of the engine: two for each lane, so that lanes are refilled."""
+"""Number of trajectories in a run of the engine: two for each lane, so that lanes are refilled."""
 
 TOLERANCES = (1e-9, 1e-10, 1e-11, 1e-12, 1e-13)
 
@@ -35,7 +35,9 @@ PEER_TOLERANCES = (1e-10, 1e-12, 1e-15)
 
 @dataclass(frozen=True)
 class _Many:
-    """A method at one setting, run for `count` trajectories: end state, shape (6,), and impacts of one of them."""
+    """A method at one setting. `run` computes `count` trajectories; it returns the end state, shape (6,), and the
+    number of impacts of one of them.
+    """
 
     method: str
     tolerance: float
@@ -70,8 +72,8 @@ def members(repetitions: int) -> Section:
     if not installed:
         rows.append({"method": THEIRS, "setting": "", "status": NOT_INSTALLED})
     notes = (
-        "Identical members, one thread. Errors of 1e-13 and below are those of rounding: the target omits settings of "
-        "heyoka with a smaller error than any of taylor.",
+        "Identical members, one thread. Errors of 1e-13 and below are rounding errors; the target therefore omits "
+        "settings of heyoka with a smaller error than any setting of taylor.",
     )
     name = "time per trajectory relative to heyoka's batch mode at equal error"
     targets = (Target(name, 1.0, _at_equal_error(rows), "1"),)
@@ -79,8 +81,8 @@ def members(repetitions: int) -> Section:
 
 
 def _at_equal_error(rows: list[dict[str, Cell]]) -> float | None:
-    """Time of the engine's fastest setting with at most the error of heyoka's, relative to heyoka's time: the greatest
-    of these ratios over the settings of heyoka.
+    """Greatest ratio, over the settings of heyoka, of the time of the engine's fastest setting that is at least as
+    accurate to the time of heyoka.
     """
     found = {name: [row for row in rows if row["method"] == name and row["status"] == "ok"] for name in (OURS, THEIRS)}
     ratios: list[float] = []

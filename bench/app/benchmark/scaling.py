@@ -125,8 +125,8 @@ def startup(warm_runs: int) -> Section:
     notes = (
         "On a machine under other load, processor time is more meaningful than elapsed time. A helper process compiles "
         "a part of the kernel at the same time.",
-        "Half of the compilation is the function that advances many members, which waits for all the others; four "
-        "fifths of that are the compiler's analysis in Python, not the optimisation of machine code.",
+        "Half of the compilation time is that of the function that advances many members, which is compiled after all "
+        "others; four fifths of it are the compiler's analysis in Python, not the optimisation of machine code.",
     )
     targets = (
         Target("compilation for predict steady", 4.0, cold - warm, "s"),

@@ -36,8 +36,8 @@ def timed(run: Callable[[], T], repetitions: int) -> Timing[T]:
 
 
 def in_turn(runs: Mapping[str, tuple[Callable[[], Any], int]]) -> dict[str, Timing[Any]]:
-    """Time several runs, each with its own number of repetitions, interleaved evenly. Garbage collection is disabled
-    during the runs.
+    """Time several functions, each with a number of repetitions; their runs are interleaved evenly. Garbage collection
+    is disabled during the runs.
     """
     times: dict[str, list[float]] = {name: [] for name in runs}
     results: dict[str, Any] = {}

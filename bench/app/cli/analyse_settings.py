@@ -45,8 +45,8 @@ class Choice:
 
 
 def choice_of(record: "DataFile", changes: Sequence[str], config: Path | None, specimen: Path | None = None) -> Choice:
-    """The settings for an open data file. The recorded settings are overridden in turn by `config`, `specimen` and
-    `changes` (KEY=VALUE).
+    """The settings of a re-analysis of an open data file. The recorded settings are overridden in turn by `config`,
+    `specimen` and `changes` (KEY=VALUE).
 
     Raises InvalidInput for unknown settings and for settings that the measurement has fixed.
     """

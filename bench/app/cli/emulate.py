@@ -32,7 +32,8 @@ LARGEST_CLOCK_ERROR = 0.01
 def emulate(
     *,
     config: Annotated[
-        Path | None, Parameter(metavar="FILE", help="Configuration that provides specimen, limits and simulation.")
+        Path | None,
+        Parameter(metavar="FILE", help="Configuration from which specimen, limits and simulation are taken."),
     ] = None,
     lasers: Annotated[Literal["serial", "analogue"], Parameter(help="Connection of the lasers.")] = "serial",
     device: Annotated[
@@ -54,7 +55,7 @@ def emulate(
         str | None,
         Parameter(
             metavar="HZ",
-            help="Sample rate of the drive, the inputs and the virtual bench [1/s] (at most 20000).",
+            help="Samples per second of the drive, the inputs and the virtual bench (at most 20000).",
             show_default="that of the simulation",
         ),
     ] = None,

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from bench.engine.interface import Requests
 
 ANSWER = 0.1
-"""Time allowed for the command's own response before another thread responds [s]."""
+"""Time allowed for the response of the main thread before another thread responds [s]."""
 ORDERLY = 0.4
 """Time allowed for an orderly end before the process is terminated [s]."""
 

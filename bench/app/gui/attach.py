@@ -6,7 +6,7 @@ from bench.app.gui.controller import Controller
 from bench.app.ipc.sessions import running_sessions
 
 PERIOD = 1000
-"""Interval between two searches for sessions [ms]."""
+"""Interval between searches for sessions [ms]."""
 
 
 class SessionWatch(QObject):

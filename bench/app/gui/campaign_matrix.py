@@ -31,7 +31,7 @@ class Cell:
 
 
 class Campaign:
-    """The points of a run in the order of its parameters: `rows` and `columns` are their values."""
+    """The points of a run in the order of its parameters; `rows` and `columns` are the values of the parameters."""
 
     def __init__(self, protocol: Protocol[Any], run: Run) -> None:
         self._axes = protocol.view.matrix

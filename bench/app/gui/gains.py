@@ -21,7 +21,7 @@ LOW, HIGH = "alpha_2_low", "alpha_2_high"
 LEAST = 1e-3
 """Smallest gain that is drawn: the axis of a spectrum is logarithmic."""
 NOT_PLAYED = "not played"
-"""Status of a point without a measurement, which is not drawn."""
+"""Status of points without a measurement, which are not drawn."""
 _SPECTRUM = frozenset({"omega", "beta", "alpha_2", "layer"})
 _CURVE = frozenset({"record", "beta", "alpha_2"})
 

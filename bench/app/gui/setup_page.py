@@ -34,7 +34,7 @@ from sim.errors import RockbenchError
 
 
 class DevicesPanel(QWidget):
-    """Search for devices, on request only and never while a run or the queue uses them."""
+    """Search for devices, only on request and never while a run or the queue uses the devices."""
 
     def __init__(self, controller: Controller) -> None:
         super().__init__()

@@ -66,9 +66,7 @@ class SensorSteadiness:
         return [detector.judge() for detector in self._detectors]
 
     def alternates(self, found: Steadiness) -> bool:
-        """Whether the cycles form a repeating pattern of unequal cycles; a slow change from cycle to cycle does not
-        count.
-        """
+        """Whether unequal cycles form a repeating pattern; a slow change from cycle to cycle is not such a pattern."""
         return found.repeats > 1 and found.spread > SPREAD * self._tolerance
 
     def _seen(self, traces: Traces) -> NDArray[np.float64]:

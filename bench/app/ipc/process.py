@@ -109,8 +109,8 @@ def _policy(configuration: BenchConfiguration) -> str:
 
 
 def _give_way() -> None:
-    """Lower the priority of a plan check, since another session may be driving the table. On Windows it is set when the
-    process is created.
+    """Lower the priority of a plan check, since another session may be driving the table. On Windows the priority is
+    set when the process is created.
     """
     if sys.platform != "win32":
         os.nice(10)

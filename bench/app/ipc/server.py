@@ -72,8 +72,8 @@ class SafetyWatch:
             self.look_driven(time, at_once=at_once)
 
     def look_driven(self, time: float | None = None, *, at_once: bool = False) -> None:
-        """Like `look`, for an armed rig: raises RigError if the inputs cannot be read. The rig has then cut its output,
-        and only this error states the reason.
+        """Like `look`, for an armed rig: raises RigError if the inputs cannot be read. In this case the rig has cut its
+        output, and only this error states the reason.
         """
         self._time = self._time if time is None else time
         if self._rig is None or (now() - self._looked < PERIOD and not at_once):

@@ -235,8 +235,8 @@ def room_refusal(found: Iterable["DiskSpace | None"]) -> InvalidInput | None:
 
 
 def own_folder(test: Queued, moment: datetime, tests: Iterable[Queued] = ()) -> Path:
-    """Folder for the results of a test that begins now: the specified one, or a newly created one that none of the
-    other `tests` uses. Raises InvalidInput if none can be created.
+    """Folder for the results of a test that begins now: the specified folder, or a new one that none of the other
+    `tests` uses. Raises InvalidInput if none can be created.
     """
     if test.out is not None:
         return Path(test.out)

@@ -180,7 +180,7 @@ def paper_report(request: PaperRequest, progress: Progress = silent) -> tuple[Do
     summary: list[Part] = [
         "The figures and statements of the paper on the rigid block coupled with a 2 d.o.f. system, "
         "recomputed from the equations of motion by one command, without a bench. Frame, block and springs "
-        f"are those of Tables 1 to 3 unless said otherwise; the sine has an amplitude of {AMPLITUDE_FACTOR:g} "
+        f"are those of Tables 1 to 3 unless stated otherwise; the sine has an amplitude of {AMPLITUDE_FACTOR:g} "
         "g/λ (Eq. 11)."
     ]
     return Document("The paper reproduced by simulation", summary, sections, provenance_line()), paper.named

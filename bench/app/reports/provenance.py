@@ -50,7 +50,9 @@ def provenance_line() -> str:
 
 
 def program(version: str, git: str, digits: int = 40) -> str:
-    """The program's version with `digits` digits of its git hash; "+" marks files changed since the commit."""
+    """The program's version with `digits` digits of its git hash; a "+" at the end of `git` means that files were
+    changed since the commit.
+    """
     changed = ", files changed since" if git.endswith("+") else ""
     return f"{NAME} {version}, git {git.removesuffix('+')[:digits]}{changed}"
 
