@@ -100,7 +100,7 @@ class Acquired(Event):
     `run` counts the armings of the rig; the block's `first` sample index is relative to the start of the run.
     `signals`, shape (n, n_signals), are in SI units, tared for the run, in the order of `bench.analysis.signals`.
     `magnitudes` returns the largest magnitude in the block of each quantity that the guard limits, by key, in SI units.
-    A subscriber may call it only until the subscriber itself returns.
+    A subscriber may call `magnitudes` only before it returns.
     """
 
     run: int
@@ -120,7 +120,7 @@ class ValuesReceived(Event):
 
 @event(table="operator_actions")
 class SpecimenMounted(Event):
-    """The operator has completed the action `work`, with its `amount` if it has one; `specimen` is now on the table."""
+    """The operator has completed the action `work`, which may have an `amount`; `specimen` is now on the table."""
 
     specimen: Specimen
     work: OperatorTask = column("", "action of the operator")
@@ -154,7 +154,7 @@ class SensorsAligned(Event):
 
 @event(notice="step")
 class StepStarted(Event):
-    """A step of the plan, described by `text`, has begun."""
+    """A step of the plan has begun; `text` describes the step."""
 
     text: str
 

@@ -15,9 +15,9 @@ Array = NDArray[np.float64]
 
 @event(table="table_response", notice="table", eq=False)
 class TableIdentified(Event):
-    """The response of the table has been identified. The arrays, each of shape (n_lines,), hold the values at the
+    """The response of the table has been identified. The arrays, each of shape (n_lines,), contain the values at the
     frequency lines, in the units of `bench.control.table_model.TableModel`; `text` states the date, the mounted
-    specimen and the level.
+    specimen and the rms acceleration.
     """
 
     text: str
@@ -27,7 +27,7 @@ class TableIdentified(Event):
     uncertainty: Array = column("m/s2/V", "standard uncertainty of the response due to noise and distortion")
     distortion: Array = column("m/s2/V", "standard deviation of one realisation due to nonlinear distortion alone")
     coherence: Array = column("1", "fraction of the acceleration's power that is coherent with the drive")
-    noise: Array = column("m/s2/Hz^0.5", "spectral density of the noise in the acceleration")
+    noise: Array = column("m/s2/Hz^0.5", "amplitude spectral density of the noise in the acceleration")
 
     @property
     def line(self) -> str:

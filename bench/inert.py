@@ -1,4 +1,6 @@
-"""Text of unknown origin, such as notes, names and headers of records, made inert for terminals and spreadsheets."""
+"""Conversion of text of unknown origin, such as notes, names and headers of records, to a form that is harmless in
+terminals and spreadsheets.
+"""
 
 import re
 
@@ -9,7 +11,7 @@ _FORMULA = ("=", "+", "-", "@", "\t", "\r")
 
 
 def shown(text: str) -> str:
-    """The text for a terminal, with escapes in place of control characters, which could move the cursor or run a
+    """The text for a terminal, in which escapes replace control characters, since these could move the cursor or run a
     command.
     """
     return _CONTROL.sub(lambda found: f"\\x{ord(found[0]):02x}", text)

@@ -97,5 +97,5 @@ def _entries(group: str) -> dict[str, EntryPoint]:
 
 @lru_cache(maxsize=8)
 def _on_path(group: str, _path: tuple[str, ...]) -> EntryPoints:
-    """Entry points of all packages on the path; their metadata are read once."""
+    """Entry points of `group` in all packages on the path; cached, so that the metadata are read only once."""
     return entry_points(group=group)

@@ -5,7 +5,9 @@ from typing import Protocol
 
 
 class Progress(Protocol):
-    """Callable to which a long computation reports its progress, in the thread of the computation's caller."""
+    """Callable to which a long computation reports its progress; it is called in the thread that started the
+    computation.
+    """
 
     def __call__(self, phase: str, done: int = 0, total: int = 0, /) -> None:
         """Report the present stage, `phase`, with `done` of its `total` parts complete if they can be counted."""
@@ -13,7 +15,7 @@ class Progress(Protocol):
 
 
 def silent(phase: str, done: int = 0, total: int = 0, /) -> None:
-    """Discard the progress."""
+    """Ignore all reports of progress."""
 
 
 def counting(progress: Progress, phase: str) -> Callable[[int, int], None]:

@@ -38,9 +38,9 @@ Sources: TypeAlias = Mapping[str, Mapping[str, "Column"]]
 class Result:
     """Result of a run, complete or interrupted.
 
-    `text` is for the terminal, `findings` (JSON content) for the summary. `figures` and `files` are written to the
-    folder of the run, each by a function of its path; their names are among those declared by the `Protocol`. `passed`
-    is the verdict of a protocol that checks the bench, and None for any other.
+    `text` is printed on the terminal, `findings` (JSON content) are stored in the summary. `figures` and `files` are
+    written to the folder of the run, each by a function that is called with the path; the `Protocol` declares their
+    names. `passed` is the verdict of a protocol that checks the bench, and None for any other.
     """
 
     points: tuple[Parameters, ...]
@@ -52,7 +52,7 @@ class Result:
 
 
 Plan: TypeAlias = Generator["Step", "Outcome", Result]
-"""Generator of the steps of a run; returns the result."""
+"""Generator that yields the steps of a run and returns its result."""
 
 
 def each_step(
@@ -106,17 +106,17 @@ class Prepared(ABC, Generic[P]):
 
     @cached_property
     def prediction(self) -> "Table":
-        """Expected results, stored before the table moves; may be empty."""
+        """Expected results, to be stored before the table moves; may be empty."""
         return {}
 
     @cached_property
     def sources(self) -> Sources:
-        """Contents of the input files other than the configuration, stored in the data file."""
+        """Contents of the input files other than the configuration, to be stored in the data file."""
         return {}
 
     @abstractmethod
     def plan(self) -> Plan:
-        """Steps of the run from the beginning; the generator returns the result."""
+        """All steps of the run, from a generator that returns the result."""
 
     def collected(self, steps: 'Generator["Step", "Outcome", object]') -> Plan:
         """Yield `steps` and return the result computed from the points that they publish."""
@@ -208,7 +208,7 @@ class Protocol(Generic[P]):
     again, else None. It raises InvalidInput for parameters beyond the capabilities of the bench. Listing the protocols
     imports this object: wrap a `prepare` with heavy imports in `deferred`.
 
-    `events` names, as "module:Event", the events that the protocol declares and that have a table in the data file.
+    `events` lists, as "module:Event", the events that the protocol declares and that have a table in the data file.
     `example` holds arguments shown in the help. `figures` and `files` name all files that a run may write in addition
     to data file and summary, with the main figure first. `positional` is the parameter that the command line accepts
     without a flag. `log_line` formats a point as one log line: the run is then displayed as a log, not as a plot.

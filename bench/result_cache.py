@@ -84,7 +84,7 @@ def _prune(folder: Path) -> None:
 
 @lru_cache(maxsize=1)
 def stamp() -> list[object]:
-    """Everything that affects a result apart from its inputs."""
+    """All versions and hashes, apart from the inputs, on which a result depends."""
     from sim.kernel.compiled import processor
 
     root, digest = Path(__file__).parents[1], sha256()

@@ -12,7 +12,7 @@ from sim.errors import RockbenchError
 from sim.extras import require
 
 _PURPOSES = {"serial": "a laser on a serial port"}
-"""Purpose of each extra that only some benches require, for the error message."""
+"""Purpose of each extra that only some benches require, as stated in the error message."""
 
 
 def require_drivers(configuration: BenchConfiguration) -> None:

@@ -2,7 +2,8 @@
 
 The code that creates such a file or folder removes it, or renames it when it is complete. The list here is needed only
 where no `finally` runs: when an interrupted process ends because its main thread does not respond, see
-`bench.app.cli.interrupt`. A second list contains the complete results, which the message of a later interrupt names.
+`bench.app.cli.interrupt`. A second list contains the complete results, which are listed in the message of a later
+interrupt.
 """
 
 import os
@@ -17,18 +18,20 @@ from uuid import uuid4
 from sim.errors import InvalidInput, RockbenchError
 
 HELD, PAUSE = 1.0, 0.05
-"""Time for which another program may hold a file that is to be renamed, and the pause between attempts [s]."""
+"""Longest time for which another program may hold a file that is to be renamed, and pause between the attempts to
+rename it [s].
+"""
 
 _paths: set[Path] = set()
 _reserved: set[Path] = set()
 _names: dict[Path, Path] = {}
-"""Final name of every result that has been or is about to be renamed, by temporary name."""
+"""Final name of every result that has been renamed or is about to be renamed, by its temporary name."""
 
 
 @contextmanager
 def unfinished(path: Path) -> Generator[Path]:
-    """Context manager to create a file or folder at `path`: removes it at exit unless it was renamed or marked as
-    `whole`.
+    """Context manager for the creation of a file or folder at `path`: removes it at exit unless it has been renamed or
+    marked as `whole`.
     """
     _names.pop(path, None)
     _paths.add(path)

@@ -40,10 +40,10 @@ def check_comments(text: RecordText, count: int, choices: Choices) -> None:
 _COMMENT = ("%", "#")
 _HEADING = re.compile(r"^(?P<name>.*?)\s*[\[(]\s*(?P<unit>[^\])]+?)\s*[\])]\s*$")
 _RISING = 0.9
-"""Fraction of rising steps above which the first column counts as time; it must then be free of errors."""
+"""Fraction of rising steps above which the first column counts as time; its steps must then all be equal."""
 
 _EQUAL = 1e-6
-"""Relative difference up to which numbers count as written equal."""
+"""Relative allowance for rounding in the comparison of time steps."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,7 +139,7 @@ def _parsed(text: RecordText, first: int, separator: str | None) -> Array:
 
 
 def _is_time(values: Array) -> bool:
-    """Whether the first of several columns rises steadily, as time does and ground acceleration does not."""
+    """Whether the first of several columns rises steadily, which times do and ground accelerations do not."""
     if values.shape[1] < 2 or len(values) < 3:
         return False
     steps = np.diff(values[:, 0])

@@ -73,6 +73,6 @@ def _comments(text: RecordText) -> int:
 
 
 def _field(text: RecordText, first: int, number: int) -> str:
-    """The integer at a position counted from 1; a line holds eight."""
+    """Text of integer `number`, counted from 1, of the lines from `first` on; a line holds eight."""
     row, column = divmod(number - 1, 8)
     return text.lines[first + row][_WIDTH * column : _WIDTH * (column + 1)]

@@ -40,9 +40,14 @@ class Pulse:
 
 @dataclass(frozen=True)
 class Shape:
-    """`peak` [g]; `duration` [s]: time between 5 and 95 % of the Arias intensity; `band` [Hz]: range that contains the
-    middle 68 % of the acceleration's energy. `ground`: frequency and damping ratio of the ground and frequency of the
-    high-pass; `significant` [s]: duration of the noise alone.
+    """Parameters of a synthetic motion.
+
+    peak : peak acceleration [g].
+    duration : time between 5 and 95 % of the Arias intensity [s].
+    band : range that contains the middle 68 % of the acceleration's energy [Hz].
+    ground : frequency [Hz] and damping ratio of the ground, and frequency [Hz] of the high-pass.
+    significant : time between 5 and 95 % of the energy of the noise alone [s].
+    pulse : velocity pulse added to the noise; None if there is none.
     """
 
     peak: float

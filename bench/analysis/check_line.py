@@ -17,7 +17,7 @@ class Verdict(StrEnum):
 
 
 _OWN_UNIT = "any"
-"""Unit in the declaration of a line's numbers, since every line states its own unit."""
+"""Unit in the declaration of a line's numbers: each line states the actual unit in `unit`."""
 
 
 class CheckLine(Parameters):

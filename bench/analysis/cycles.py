@@ -47,7 +47,7 @@ class Cycle:
     `coefficients`, shape (1 + 2 H, m): mean, cosines and sines of the harmonics of phase = omega (sample index) / rate.
     `fundamental` holds the complex amplitudes c with signal = Re(c exp(-i phase)); `peak` is the largest magnitude of
     the fitted motion, including its mean; `noise` is the rms of the residual; shape (m,) each. `extreme`, shape (m,),
-    is the largest magnitude of the samples: the fit overshoots a motion that differs at both ends of the cycle.
+    is the largest magnitude of the samples: the fit overshoots a motion that differs between the two ends of the cycle.
     """
 
     index: int
@@ -108,8 +108,8 @@ the vertex is 5e-6 for a sine and 3e-3 for a fifth harmonic.
 
 @lru_cache(maxsize=8)
 def _parabola(points: int) -> NDArray[np.float64]:
-    """Matrix that fits a parabola by least squares to `points` samples at -h to h; its rows give the coefficients of 1,
-    x, x^2.
+    """Matrix that fits a parabola by least squares to `points` samples at x = -h, ..., h, with h = points // 2; its
+    rows give the coefficients of 1, x and x^2.
     """
     x = np.arange(points, dtype=np.float64) - points // 2
     return np.linalg.pinv(np.stack([np.ones_like(x), x, x**2], axis=1)).astype(np.float64)
@@ -141,8 +141,8 @@ class Waves:
 
     `waveform` and `rates`, its derivative with respect to the phase [1/rad], both of shape (k, m), cover one period;
     `peaks`, shape (m,), are the largest magnitudes, in row `at` of the waveform; `there`, shape (n, m), is each cycle's
-    magnitude at that point. `harmonics`, shape (m,), is the rms of all harmonics above the fundamental, divided by the
-    fundamental.
+    magnitude in the same row. `harmonics`, shape (m,), is the rms of all harmonics above the fundamental, divided by
+    the fundamental.
     """
 
     waveform: NDArray[np.float64]

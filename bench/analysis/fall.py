@@ -10,11 +10,11 @@ from bench.analysis.signals import U1
 from sim.specimen import Specimen
 
 FALLEN_TILT = 0.25
-"""Tilt [rad] beyond any rocking motion: about twice the block's critical angle."""
+"""Tilt [rad] that no rocking block reaches: about twice the block's critical angle."""
 
 
 PERIODS = 2.0
-"""Periods of the frame's first mode covered by the mean.
+"""Number of periods of the frame's first mode over which u1 is averaged.
 
 In violent rocking without a fall (30 simulated records, up to 3 times the uplift acceleration) the mean over one period
 reaches 1.28 times the threshold, and the mean over two periods 0.68 times. A fall is detected 0.2 to 0.9 s after the

@@ -41,15 +41,15 @@ SMALL = 0.15
 """Largest relative deviation of the peaks from their mean up to which the peak of the orbit is stated."""
 
 SHORTEST, SINGULAR, STEP = 24, 1e8, 1e-6
-"""For a rate: smallest number of changes, largest condition number of the equations, and step of the finite
-differences.
+"""Limits and step of the computation of a rate: smallest number of changes, largest condition number of the equations,
+and step of the finite differences.
 """
 
 
 @dataclass(frozen=True)
 class Rate:
-    """Slowest pair of multipliers of a motion near a periodic motion: modulus per cycle and its standard uncertainty,
-    and `angle` [rad] per cycle.
+    """Slowest-decaying pair of multipliers of a motion near a periodic motion: `modulus` per cycle with its standard
+    `uncertainty`, and `angle` [rad] per cycle.
     """
 
     modulus: float

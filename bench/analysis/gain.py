@@ -22,10 +22,10 @@ scatter of 1.1 %.
 """
 
 ZERO_PLACES = 32
-"""Number of points that represent a cycle."""
+"""Number of points of a cycle whose mean is the zero of its peak."""
 
 CHECK_PLACES = 64
-"""Number of points of a cycle at which the readings check the linearity of a laser."""
+"""Number of points of a cycle at which a laser's readings are evaluated to check its linearity."""
 
 FRAME_SHARE = 0.3
 """Relative standard uncertainty of a harmonic of the bare frame that is computed from the same harmonic of the

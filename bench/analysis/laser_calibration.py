@@ -54,7 +54,7 @@ class LaserCurve(Parameters):
 
 
 class LaserCalibration(Parameters):
-    """Both lasers calibrated against one motion. All uncertainties are standard uncertainties."""
+    """Calibration of both lasers from one motion. All uncertainties are standard uncertainties."""
 
     date: AwareDatetime = quantity(..., "", "date of the measurement")
     valid_days: float = quantity(..., "d", "period of validity", gt=0, usual=(7.0, 1100.0))

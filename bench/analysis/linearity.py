@@ -60,9 +60,9 @@ ROUNDING = 1e-12
 class Harmonics:
     """Harmonics of the reading of one laser in a test of a linear frame.
 
-    `readings`, shape (n,) [m], over one period at equal steps of the phase, relative to the rest; `found`, shape (m,),
-    complex [m], are the amplitudes c_k of the orders from 2 in signal = Re(sum of c_k exp(-i k phase)); `uncertainty`,
-    shape (m,) [m], is the standard uncertainty of their real and imaginary parts.
+    `readings`, shape (n,) [m], over one period at equal steps of the phase, relative to the rest position; `found`,
+    shape (m,), complex [m], are the amplitudes c_k, from order 2 on, in signal = Re(sum of c_k exp(-i k phase));
+    `uncertainty`, shape (m,) [m], is the standard uncertainty of their real and imaginary parts.
     """
 
     readings: Array

@@ -37,7 +37,7 @@ FEWEST = 8
 """Minimum number of cycles for a fit."""
 
 ROUNDING = 1e-12
-"""Scatter, relative to the values, up to which it is due to rounding."""
+"""Largest scatter, relative to the values, that is attributed to rounding."""
 
 
 def remaining_transient(series: Array, measured: int) -> float:

@@ -15,9 +15,9 @@ class RunningGain:
     """alpha_2 during a test, with the budget of `gain` except the contribution of the table's amplitude, whose slope is
     not yet known.
 
-    The linearity errors of the lasers, which take most of the time, are evaluated again when the readings have changed
-    by `CHANGED`. Until then those of the earlier motion, relative to its drift, are used, which changes the uncertainty
-    by less than 1 %.
+    The linearity errors of the lasers, which take most of the computing time, are evaluated again when a reading has
+    changed by more than `CHANGED`. Until then, those of the earlier motion, relative to its drift, are used; this
+    changes the uncertainty by less than 1 %.
     """
 
     def __init__(self, bare: SteadyPeak, sensors: SensorUncertainty, shared: SharedDraws) -> None:

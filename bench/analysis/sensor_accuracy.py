@@ -58,12 +58,14 @@ class SensorAccuracy(Parameters):
 class PeakReadings:
     """Readings of both lasers at the peak of a drift, relative to the rest position of the storeys.
 
-    drift, sign : the peak [m], and its sign, 1 or -1. lasers, speeds : reading of each laser [m] and its rate [m/s].
-    zero : readings [m] whose mean is the zero of the peak, shape (2, n): (0, 0) for a zero taken at rest. swings : span
-    of each laser's readings [m] in the fit of the peak; `terms`: number of independent rounding errors in the peak: 1
-    for a mean. at_rest : whether the zero was taken at rest, where the rounding is not averaged. weights : derivatives
-    of the peak with respect to the readings at the places of `zero`, shape (n,), for a peak of a fitted cycle; None for
-    the reading at the peak minus the mean of `zero`.
+    drift, sign : the peak [m], and its sign, 1 or -1.
+    lasers, speeds : reading of each laser [m] and its rate [m/s].
+    zero : readings [m], shape (2, n), whose mean is the zero of the peak; (0, 0) for a zero taken at rest.
+    swings : span of each laser's readings [m] in the fit of the peak.
+    terms : number of independent rounding errors in the peak; 1 for a mean.
+    at_rest : whether the zero was taken at rest, where rounding errors do not average out.
+    weights : derivatives of the peak of a fitted cycle with respect to the readings in `zero`, shape (n,); None if the
+        peak is the reading at the peak minus the mean of `zero`.
     """
 
     drift: float
@@ -180,7 +182,7 @@ class SensorUncertainty:
         return linearity_errors(beyond, _shares(seen), limit, whole)
 
     def rough(self, shapes: "Shapes") -> tuple[str, ...]:
-        """Remarks on lasers whose linearity error is not smooth according to the tests of the bare frame."""
+        """Remark on each laser whose linearity error, according to the tests of the bare frame, is not smooth."""
         if self.calibration is not None or not self.checks or self.accuracy.laser_linearity == 0.0:
             return ()
         return tuple(

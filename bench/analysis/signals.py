@@ -67,7 +67,7 @@ class SignalMap:
     def tare(self, values: NDArray[np.float64]) -> None:
         """Take the mean of channel values at rest, shape (n, n_channels), as the zero of every signal.
 
-        A signal without any value keeps its sensor's zero.
+        The zero of a signal without any value is that of its sensor.
         """
         raw = self._raw(values)
         valid = np.count_nonzero(np.isfinite(raw), axis=0)

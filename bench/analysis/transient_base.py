@@ -1,8 +1,9 @@
 """Base motion of a transient, from both table sensors, as the input of the transient's prediction.
 
 A displacement sensor measures the acceleration far more precisely than an accelerometer at low frequencies, and far
-less precisely at high frequencies, since its noise grows with omega^2. At each frequency the two are combined with
-weights from their noise at rest,
+less precisely at high frequencies, since its noise grows with omega^2. At each frequency the spectra A_a of the
+accelerometer and X of the displacement sensor are combined with weights from the densities S_a and S_x of their noise
+at rest,
 
     A = w (-omega^2 X) + (1 - w) A_a,    w = S_a / (S_a + omega^4 S_x),
 
@@ -84,9 +85,7 @@ class BaseMotion:
         return float(np.abs(self.acceleration).max())
 
     def draw(self, random: Generator, scale: float = 1.0) -> SampledRecord:
-        """A possible true motion: the measured motion scaled by `scale`, with a random realisation of the noise
-        added.
-        """
+        """A possible true motion: the measured motion multiplied by `scale`, plus a random realisation of the noise."""
         spectrum = np.empty(self.noise.size, np.complex128)
         spectrum.real = self._root * random.standard_normal(spectrum.size)
         spectrum.imag = self._root * random.standard_normal(spectrum.size)

@@ -8,7 +8,8 @@ The residual of x^6 over a window of half width h is the monic Legendre polynomi
 
     (5 / 231) h^6 s^(6) / 720,    s^(6) ~ A omega_6^6,    omega_6^12 = sum omega^12 |S|^2 / sum |S|^2,
 
-and h balances it against the noise of the fit, 225/64 sigma^2 over the number of samples.
+with the signal s, its spectrum S and its amplitude A. The half width h balances this shift against the variance of the
+fit due to noise, 225/64 sigma^2 over the number of samples.
 """
 
 from dataclasses import dataclass
@@ -50,7 +51,7 @@ def running_peak(signal: Array) -> Array:
 
 DEGREE = 4
 _REMAINDER = 5.0 / 231.0 / 720.0
-"""Shift of the fitted value at the centre per h^6 s^(6)."""
+"""Shift of the fitted value at the centre, divided by h^6 s^(6)."""
 _VARIANCE = 225.0 / 64.0
 """Variance of the fitted value at the centre, relative to sigma^2 / samples."""
 _NARROWEST = 6

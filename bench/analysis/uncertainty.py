@@ -57,7 +57,7 @@ def enlarged(covariance: Array, scatter: Array) -> Array:
 
 
 def student_factor(number: int) -> float:
-    """Factor on the scatter for this number of repeats: ratio of the 95 % interval of Student's t to that of the normal
+    """Factor on the scatter of this number of repeats: the 95 % interval of Student's t divided by that of the normal
     distribution.
     """
     from scipy.stats import norm, t
@@ -126,8 +126,8 @@ class Budget:
 
 
 def decimals(uncertainty: float) -> int | None:
-    """Number of decimal places up to the second digit of an uncertainty; None unless the uncertainty is finite and
-    positive.
+    """Number of decimal places with which an uncertainty has two significant digits; None unless the uncertainty is
+    finite and positive.
     """
     if not (isfinite(uncertainty) and uncertainty > 0.0):
         return None

@@ -131,11 +131,12 @@ def solve(
     step: float | None = None,
     overturning_angle: float = pi / 2,
 ) -> Motion:
-    """`sim.rocking.simulate` by the solver `name`; its knob, `tolerance` or `step` [s], has a default.
+    """Same as `sim.rocking.simulate`, but by the solver `name`. Its accuracy parameter, `tolerance` or `step` [s], has
+    a default.
 
     With `paper` the block never returns to rest, impacts occur at ends of steps and peaks are sampled at steps. The
-    others converge to `taylor` with their order. Raises InvalidInput for an unknown name, the knob of another solver,
-    or a value out of range.
+    others converge to `taylor` with their order. Raises InvalidInput for an unknown name, the accuracy parameter of
+    another solver, or a value out of range.
     """
     solver = SOLVERS.get(name)
     if solver is None:
@@ -163,7 +164,7 @@ def solve(
 
 
 LAST_PERIODS = 60
-"""Number of drive periods at the end of a run over which its peaks are taken.
+"""Number of drive periods at the end of a run in which its peaks are determined.
 
 The motion of a solver that does not locate impacts fluctuates about its steady state. A short window misses the
 extremes, so the result depends on the window (docs/benchmarks.md states the spread). A solver that locates impacts

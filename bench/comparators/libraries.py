@@ -3,8 +3,8 @@ by LLVM.
 
 The equations for heyoka are deliberately written out here: an independent reference must not share those of this
 program. One system covers both corners, with the sign of the corner as a parameter that the impact changes. The event
-is a falling sg theta. If theta itself were the event, the start of the case at theta = 0 would count as an impact,
-transfer the block to the wrong corner and overturn it. sg theta rises from every impact and from the start, and a
+is a falling sg theta. If theta itself were the event, the start of the case at theta = 0 would count as an impact, so
+that the block would be on the wrong corner and overturn. sg theta rises from every impact and from the start, and a
 rising root is not an event, so that no guard time after an impact is required. The impacts of the case are strong and
 do not test heyoka's protection against chatter.
 

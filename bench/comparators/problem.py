@@ -16,9 +16,12 @@ from sim.specimen import Specimen
 class Problem:
     """An initial value problem ready for a solver.
 
-    `parameters`: `Specimen.packed()`, shape (16,). `segments`: packed excitation, shape (n, 10). `start`: initial
-    state, shape (6,). `times`: times of the samples, shape (m,) [s]. `sampled`: whether samples are requested.
-    `peaks_from` [s]: time from which peaks are taken; infinite if no peaks are requested.
+    parameters : result of `Specimen.packed()`, shape (16,).
+    segments : packed excitation, shape (n, 10).
+    start : initial state, shape (6,).
+    times : times of the samples, shape (m,) [s].
+    sampled : whether samples are requested.
+    peaks_from : time from which peaks are determined [s]; infinite if no peaks are requested.
     """
 
     parameters: NDArray[np.float64]
@@ -43,7 +46,9 @@ class Problem:
         peaks_from: float | None,
         overturning_angle: float,
     ) -> "Problem":
-        """The problem from the arguments of `sim.rocking.simulate`. Raises InvalidInput for the same errors."""
+        """The problem defined by the arguments of `sim.rocking.simulate`. Raises InvalidInput for the same errors as
+        that function.
+        """
         check_options(TOLERANCE, overturning_angle)
         drive, start = Drive(excitation), state or State()
         check_state(specimen, start, overturning_angle)

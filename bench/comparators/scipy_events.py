@@ -26,7 +26,7 @@ WATCHED = (
     (np.array([-1.0, 1.0, 0.0, 0.0, 0.0, 0.0]), np.array([0.0, 0.0, -1.0, 1.0, 0.0, 0.0])),
     (np.array([0.0, 0.0, 0.0, 0.0, 1.0, 0.0]), np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0])),
 )
-"""Combinations of the state that give u1, u2 - u1 and theta, each with its velocity."""
+"""Rows that select u1, u2 - u1 and theta, and their velocities, from the state."""
 
 
 def dop853(problem: Problem, tolerance: float) -> Motion:

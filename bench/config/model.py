@@ -227,7 +227,9 @@ class BenchConfiguration(Parameters):
             return None
         settings = load_backend(name).settings
         if not issubclass(settings, RigSettings):
-            raise ValueError(f'the settings of the backend "{name}" are not a {RigSettings.__module__}.RigSettings')
+            raise ValueError(
+                f'the settings class of the backend "{name}" is not a subclass of {RigSettings.__module__}.RigSettings'
+            )
         if isinstance(given, settings):
             return given
         if not isinstance(given, dict | None):
@@ -285,11 +287,11 @@ class BenchConfiguration(Parameters):
         if self.backend != "hardware":
             return self
         if watchdog is not None and watchdog < _BLOCKS_OF_WATCHDOG * block:
-            allowed = f"it is reset once per block of {block:g} s: use at least {_BLOCKS_OF_WATCHDOG} blocks"
+            allowed = f"the watchdog is reset once per block of {block:g} s: use at least {_BLOCKS_OF_WATCHDOG} blocks"
             raise InvalidInput("hardware.daq.watchdog", watchdog, allowed)
         heartbeat = self.hardware.daq.heartbeat
         if heartbeat is not None and heartbeat.timeout < _BLOCKS_OF_HEARTBEAT * block:
-            allowed = f"it rises in every other block of {block:g} s: use at least {_BLOCKS_OF_HEARTBEAT} blocks"
+            allowed = f"its line rises in every other block of {block:g} s: use at least {_BLOCKS_OF_HEARTBEAT} blocks"
             raise InvalidInput("hardware.daq.heartbeat.timeout", heartbeat.timeout, allowed)
         if self.hardware.lasers.connection == "serial" and block < _SHORTEST_WITH_SERIAL_LASERS:
             allowed = (

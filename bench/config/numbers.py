@@ -26,7 +26,7 @@ def converted(digits: str, typed: str, unit: str) -> float:
     Raises ValueError that names both units if the typed unit is unknown or has another dimension.
     """
     if unit == "":
-        raise ValueError(f"it has no unit: remove {typed!r}")
+        raise ValueError(f"it must be a number without a unit: remove {typed!r}")
     factor = _factor(typed, unit)
     # in decimal arithmetic, so that 57 mm is exactly 0.057
     value = float(Decimal(digits) * Decimal(repr(factor)))

@@ -40,8 +40,8 @@ _REACH = {
 _LEAST_SHARE = 0.01
 """Fraction of a channel's range below which a limit is unusual."""
 _NOISE = (1e-7, 1e-4)
-"""Usual spectral density of a channel's noise relative to its range [1/Hz^0.5]: from a 16-bit converter's to 0.3 % of
-the range in a band of 1 kHz.
+"""Usual amplitude spectral density of a channel's noise, relative to its range [1/Hz^0.5]: from that of a 16-bit
+converter to that of noise with an rms of 0.3 % of the range in a band of 1 kHz.
 """
 
 

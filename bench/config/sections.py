@@ -116,7 +116,7 @@ class Twin(Parameters):
         ge=0,
         le=199,
     )
-    seed: int = quantity(1, "", "random seed of these specimens", ge=0, lt=2**32)
+    seed: int = quantity(1, "", "random seed of the random specimens", ge=0, lt=2**32)
     laser_lag: float | None = quantity(
         None,
         "s",

@@ -55,7 +55,7 @@ def problems(
 
 
 def former_names(model: type[Parameters], data: Mapping[str, Any], parent: Path = ()) -> Iterator[tuple[Path, str]]:
-    """The keys of `data` that have the name of an earlier version, which `validated` accepts, with their present
+    """The keys of `data` that have the name of an earlier version, which `validated` accepts, with their current
     names.
     """
     for entry in declared(model):
@@ -67,8 +67,8 @@ def former_names(model: type[Parameters], data: Mapping[str, Any], parent: Path 
 
 
 def with_present_names(model: type[Parameters], data: Mapping[str, Any]) -> dict[str, Any]:
-    """The data of a file with the present names of its keys. A key present under both names keeps both, and validation
-    then refuses it.
+    """The data of a file, with former names of keys replaced by the current ones. A key given under both its former and
+    its current name keeps both, and validation then refuses it.
     """
     found = dict(data)
     for entry in declared(model):

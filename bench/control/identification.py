@@ -144,7 +144,7 @@ class LineResponse:
 
     `response` [unit/V] has the standard `uncertainty` due to noise and distortion together; `noise` is the contribution
     of noise to it, `distortion` the standard deviation of one realisation's response due to distortion alone, NaN for a
-    single realisation. `noise_density` [unit/Hz^0.5] is the density of the noise in the output.
+    single realisation. `noise_density` [unit/Hz^0.5] is the amplitude spectral density of the noise in the output.
     """
 
     frequency: Array

@@ -17,7 +17,7 @@ from bench.control.target import Reach
 from sim.errors import InvalidInput
 
 INFEASIBLE = 1e-10
-"""Least-squares residual below which no vector satisfies the inequalities."""
+"""Residual of the dual least-squares problem below which no vector satisfies the inequalities."""
 
 
 class Infeasible(Exception):
@@ -170,7 +170,7 @@ MOST_ROUNDS = 60
 
 
 class _Bound(NamedTuple):
-    """A sample at which `sign` times the velocity or displacement is constrained to the limit."""
+    """A sample at which `sign` times the velocity or displacement must not exceed the limit."""
 
     sample: int
     of_displacement: bool

@@ -32,7 +32,7 @@ class DriveCalibration:
 
     @staticmethod
     def flat(response: complex) -> "DriveCalibration":
-        """A calibration with the same response at every frequency, from which a measurement of the response starts."""
+        """A calibration with the same response at every frequency, as a start for a measurement of the response."""
         return DriveCalibration((1.0,), (response,))
 
     def at(self, omega: NDArray[np.float64]) -> NDArray[np.complex128]:
@@ -40,7 +40,7 @@ class DriveCalibration:
         return np.asarray(np.interp(omega, self.omega, np.asarray(self.response, dtype=np.complex128)), np.complex128)
 
     def beyond(self, other: "DriveCalibration") -> "DriveCalibration":
-        """This calibration with the points of `other` above its last frequency added."""
+        """This calibration, extended by the points of `other` above its last frequency."""
         above = [(omega, response) for omega, response in other.points if omega > self.omega[-1]]
         return DriveCalibration(
             (*self.omega, *(omega for omega, _ in above)), (*self.response, *(response for _, response in above))
@@ -54,7 +54,7 @@ class DriveCalibration:
 
 @dataclass(frozen=True)
 class Leg:
-    """A segment of a program that reaches a table acceleration `amplitude` [m/s2] at `omega` [rad/s] in `duration`
+    """Segment of a program that reaches the table acceleration `amplitude` [m/s2] at `omega` [rad/s] after `duration`
     [s].
     """
 
@@ -123,8 +123,8 @@ class Oscillator:
         self._sweeps.append(sweep)
 
     def trim(self, shares: tuple[complex, ...], blend: float = 1.0, wait: int = 0) -> None:
-        """Change to `shares` of fundamental, second harmonic and so on, over `blend` cycles of the present frequency,
-        beginning after `wait` samples.
+        """Change to these `shares` of the fundamental, second harmonic and so on, within `blend` cycles of the present
+        frequency, beginning after `wait` samples.
         """
         self._shares.to(shares, round(blend * self._cycle), wait)
 

@@ -17,7 +17,7 @@ from sim.errors import InvalidInput
 from sim.excitation import SampledRecord
 
 ROUNDING = 1e-9
-"""Relative tolerance for the ratio of two steps."""
+"""Relative tolerance within which the ratio of two time steps counts as an integer."""
 
 
 def scaled(record: SampledRecord, length_ratio: float) -> SampledRecord:

@@ -20,7 +20,8 @@ class ShareRamp:
         self._played = 0
 
     def to(self, shares: tuple[complex, ...], samples: int, wait: int = 0) -> None:
-        """Change to `shares` within `samples` samples, beginning after `wait` samples; other harmonics go to zero.
+        """Change to `shares` within `samples` samples, beginning after `wait` samples; all other harmonics change to
+        zero.
 
         A change that is due later than this one is cancelled.
         """

@@ -36,14 +36,16 @@ class Sine:
     calibration: DriveCalibration
 
     def turn(self, cycle: Cycle) -> complex:
-        """Factor exp(i phi), with the oscillator's phase phi where the phase of the cycles is zero, from a cycle with a
-        pure sine drive.
+        """Factor exp(i phi), where phi is the oscillator's phase at zero phase of the cycles; determined from a cycle
+        with a pure sine drive.
         """
         asked = complex(cycle.harmonics(_DRIVE)[0] * self.calibration.at(np.array(self.omega)))
         return asked / abs(asked)
 
     def fundamentals(self, cycle: Cycle, turn: complex) -> tuple[complex, complex]:
-        """Shares of the fundamental in one cycle: played by the drive, achieved by the table's acceleration."""
+        """Shares of the fundamental in one cycle: those of the drive as played, and those of the table's
+        acceleration.
+        """
         unit = self.amplitude * turn
         played = cycle.harmonics(_DRIVE)[0] * self.calibration.at(np.array(self.omega)) / unit
         return complex(played), complex(cycle.harmonics(ACCELERATION)[0] / unit)
@@ -99,8 +101,8 @@ GAIN = 0.9
 """Fraction of an error removed by one step, below 1 because gains are uncertain."""
 
 PATIENCE = 6
-"""Number of steps after which that fraction falls as 1, 1/2, 1/3 and so on. The mean of a non-repeating motion is then
-corrected; a correction of each deviation would change the motion.
+"""Number of steps after which the fraction `GAIN` is divided by 1, 2, 3 and so on. The mean of a non-repeating motion
+is then corrected; a correction of each deviation would change the motion.
 """
 
 LARGEST_STEP = 0.10

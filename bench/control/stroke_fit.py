@@ -31,7 +31,7 @@ corner per order.
 
 @dataclass(frozen=True, eq=False)
 class HighPassed:
-    """The filtered record [m/s2], the number of zeros added before it, and the corner [Hz]."""
+    """The filtered record [m/s2], the number of zeros inserted before it, and the corner frequency [Hz]."""
 
     acceleration: Array
     lead: int

@@ -58,7 +58,7 @@ class TableModel(Parameters):
     uncertainty: Values = quantity(..., "m/s2/V", "standard uncertainty of the response due to noise and distortion")
     distortion: Values = quantity(..., "m/s2/V", "standard deviation of the response due to nonlinear distortion alone")
     coherence: Values = quantity(..., "1", "fraction of the acceleration's power explained by the drive")
-    noise: Values = quantity(..., "m/s2/Hz^0.5", "spectral density of the noise in the acceleration")
+    noise: Values = quantity(..., "m/s2/Hz^0.5", "amplitude spectral density of the noise in the acceleration")
 
     @model_validator(mode="after")
     def _lines_of_one_length(self) -> "TableModel":
@@ -88,7 +88,7 @@ class TableModel(Parameters):
         return np.interp(frequency, self.frequency, self.coherence)
 
     def noise_at(self, frequency: Array) -> Array:
-        """Noise density [m/s2/Hz^0.5] at `frequency` [Hz] within the band, same shape."""
+        """Amplitude spectral density of the noise [m/s2/Hz^0.5] at `frequency` [Hz] within the band, same shape."""
         self._require(frequency)
         return np.interp(frequency, self.frequency, self.noise)
 
@@ -178,7 +178,7 @@ class TableInverse:
         return np.fft.rfft(record)[self._inside]
 
     def record(self, spectrum: Complex) -> Array:
-        """The record of a spectrum that is zero outside the support."""
+        """The record with this `spectrum` within the support and zero outside it."""
         whole = np.zeros(self._inside.size, dtype=np.complex128)
         whole[self._inside] = spectrum
         return np.fft.irfft(whole, self._size)

@@ -1,6 +1,4 @@
-"""Target motion of the table, which is a record within the table's band with rest at both ends, and the table's
-reach.
-"""
+"""Target motion of the table, a record within the table's band with rest at both ends; and the reach of the table."""
 
 from dataclasses import dataclass, replace
 from math import isfinite

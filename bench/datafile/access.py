@@ -43,7 +43,7 @@ def locking(system: str = sys.platform) -> Literal["best-effort"] | bool:
 
 
 def open_living(path: Path) -> Any:
-    """Open a file that is being written, in single-writer mode, for reading."""
+    """Open, for reading in single-writer mode, a file that is being written."""
     return _opened(path, h5f.ACC_RDONLY | h5f.ACC_SWMR_READ)
 
 

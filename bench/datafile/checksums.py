@@ -1,4 +1,4 @@
-"""Checksums of datasets: those of fixed datasets at the start of the run, those of growing datasets at its end.
+"""Checksums of datasets, computed for fixed datasets at the start of the run and for growing datasets at its end.
 
 The checksum of a dataset is the SHA-256 of its values' bytes, uncompressed and in order, in hexadecimal digits.
 Checksums of attributes cover names and values as JSON, so that a later change to a conversion is detected. Checksums of
@@ -110,7 +110,9 @@ def _walk(group: hdf5.Group, stored: list[hdf5.Dataset], groups: dict[str, str])
 
 
 def covered_groups(entry: hdf5.Group) -> Iterator[hdf5.Group]:
-    """The root, the entry and the entry's contents, except the checksums and the views, which are created later."""
+    """The groups that have a checksum: the root, the entry and the entry's contents, except the checksums and the
+    views, which are created later.
+    """
     yield hdf5.group(entry, "/")
     yield from (each for each in hdf5.groups(entry) if each.name.split("/")[2:3] not in ([GROUP], [FIT_VIEWS]))
 
@@ -123,7 +125,9 @@ def read_groups(entry: hdf5.Group) -> dict[str, str]:
 
 
 def read(entry: hdf5.Group) -> dict[str, tuple[str, str]]:
-    """The checksums of values and attributes by path; the checksums of values are empty if the file was not closed."""
+    """The stored checksums of values and attributes, by path. The checksums of growing values are empty if the file was
+    not closed.
+    """
     columns = [hdf5.read_texts(hdf5.dataset(entry, path)[:]) for path in (_DATASETS, _VALUES, _ATTRIBUTES)]
     return {path: (values, attributes) for path, values, attributes in zip(*columns, strict=True)}
 
@@ -133,8 +137,8 @@ def _bytes(values: NDArray[Any]) -> bytes:
 
 
 def _of_json(content: Mapping[str, Any]) -> str:
-    # an attribute of a type that this software never writes may have no JSON form: `repr` then gives a checksum that
-    # counts as wrong
+    # an attribute of a type that this software never writes may have no JSON form; its `repr` is then hashed, and the
+    # checksum does not match
     return sha256(json.dumps(content, sort_keys=True, default=repr).encode()).hexdigest()
 
 

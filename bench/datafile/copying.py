@@ -20,7 +20,8 @@ BYTES_AT_ONCE = 2**22
 
 @dataclass
 class Copying:
-    """A copy of `counted` rows of every part, from a file of `size` bytes, without the paths in `leave`.
+    """A copy of a file of `size` bytes: the first `counted` rows of each part, without the objects at the paths in
+    `leave`.
 
     `lost` receives the reason for each unreadable path; growing datasets are copied up to the last readable row.
     """
@@ -110,7 +111,7 @@ def drop_channels(entry: hdf5.Group, lost: dict[str, str]) -> None:
 
 
 def renew_drive(entry: hdf5.Group) -> None:
-    """Replace the dataset of the drive, if it is lost, by NaN at every sample."""
+    """If the dataset of the drive is lost, replace it by one with NaN at every sample."""
     instrument = hdf5.group(entry, "instrument")
     if hdf5.has(instrument, "drive/voltage"):
         return
@@ -124,8 +125,8 @@ def renew_drive(entry: hdf5.Group) -> None:
 
 
 def renew_tables(entry: hdf5.Group, lost: Iterable[str], own: Iterable[str]) -> None:
-    """Empty every table of which a dataset is among the `lost` paths; the journal may refill it. Tables of the
-    protocol's `own` events are removed instead, because their columns are declared only by the protocol.
+    """Empty every table that has a dataset among the `lost` paths; its rows may be recovered from the journal. Tables
+    of the protocol's `own` events are removed instead, because their columns are declared only by the protocol.
     """
     gone = tuple(lost)
     for path in (*TABLES, *own):

@@ -37,7 +37,8 @@ class Kind(StrEnum):
 
 @dataclass(frozen=True)
 class Field:
-    """A field of a row. An absent number is stored as NaN, an absent switch as -1, and an absent string as empty.
+    """A field of a row. An absent number is stored as NaN, an absent switch as -1, and an absent string as an empty
+    string.
 
     If `array` is true, each element of the value is a row. A `packed` field is compressed, in chunks of many rows.
     """
@@ -138,7 +139,7 @@ def fields_of(row_type: type[Any]) -> tuple[Field, ...]:
 
 
 def parts_of(row_type: type[Any]) -> tuple[str, type[Any]] | None:
-    """Name and item type of the column of a dataclass that is a tuple of dataclasses; None if there is no such
+    """Name and item type of the column whose value is a tuple of dataclasses; None if the dataclass has no such
     column.
     """
     for name, hint, _ in _columns(row_type):

@@ -118,7 +118,9 @@ def _table(entry: hdf5.Group, name: str) -> list[dict[str, Any]]:
 
 
 FINDINGS = (
-    Field("number", Kind.WHOLE, "1", "number of earlier sets of findings; the last set is valid"),
+    Field(
+        "number", Kind.WHOLE, "1", "number of the set: the number of rows of all earlier sets; the last set is valid"
+    ),
     Field("time", Kind.REAL, "s", "bench time"),
     Field("name", Kind.TEXT, "", "name of the quantity, as in a specimen file"),
     Field("value", Kind.REAL, "of the row", "best estimate"),
@@ -128,10 +130,10 @@ FINDINGS = (
     Field("date", Kind.TEXT, "", "date of the measurement, ISO 8601 with time zone"),
 )
 CORRELATIONS = (
-    Field("number", Kind.WHOLE, "1", "number of earlier sets of findings, as for the two findings"),
+    Field("number", Kind.WHOLE, "1", "number of the set of findings, as in the rows of the two findings"),
     Field("first", Kind.TEXT, "", "name of a finding"),
     Field("second", Kind.TEXT, "", "name of another finding"),
-    Field("coefficient", Kind.REAL, "1", "correlation coefficient of their errors; 0 for other pairs"),
+    Field("coefficient", Kind.REAL, "1", "correlation coefficient of their errors; 0 for pairs without a row"),
 )
 FINDING_TABLES = {"identified": FINDINGS, "identified_correlations": CORRELATIONS}
 

@@ -175,7 +175,9 @@ def write_texts(parent: Group, name: str, texts: Iterable[str], *, description: 
 
 
 def write_text_array(parent: Group, name: str, texts: NDArray[np.str_], *, description: str) -> Dataset:
-    """Same as `write_texts` in parts, because objects of strings need far more memory than an array of them."""
+    """Write an array of strings like `write_texts`, but in parts, because string objects need far more memory than an
+    array.
+    """
     if len(texts) <= MANY:
         return write_texts(parent, name, texts.tolist(), description=description)
     parts = [slice(first, first + MANY) for first in range(0, len(texts), MANY)]

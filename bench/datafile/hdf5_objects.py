@@ -30,7 +30,7 @@ def is_hard_link(parent: Any, name: str) -> bool:
 
 
 def stored_member(parent: Any, name: str, *, read_only: bool = False) -> Any:
-    """The member `name`, as returned by `parent[name]`, but without a query for the mode of the file each time.
+    """The member `name`, as returned by `parent[name]`, but without querying the mode of the file at every access.
 
     In a `read_only` file, a dataset keeps its shape in memory.
     """

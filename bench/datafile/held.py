@@ -1,4 +1,5 @@
-"""Flushing of the data file to the disk, and protection from locks of other programs while it is being written.
+"""Flushing of the data file to the disk, and protection of the file from locks by other programs while it is being
+written.
 
 On Windows locks are mandatory: while a reader with the usual locks of HDF5 has the file open, every write fails with
 errno 13, and HDF5 cannot repeat a flush that has failed. Therefore the writer excludes such readers: it locks one byte

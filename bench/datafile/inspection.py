@@ -120,7 +120,9 @@ def _journal(path: Path) -> str | None:
 
 @dataclass(frozen=True)
 class Verdict:
-    """Number of datasets, number of those compared with a checksum, and a message for every problem."""
+    """Result of a verification: the number of datasets, how many of them were compared with a checksum, and a message
+    for every problem.
+    """
 
     datasets: int
     compared: int
@@ -172,7 +174,9 @@ def _of_record(record: DataFile, size: int) -> Iterator[str]:
     plot = hdf5.group(entry, PLOT)
     named = [plot.attrs.get("signal"), *plot.attrs.get("axes", ())]
     yield from (
-        f"the default plot names {name!r}, which does not exist" for name in named if name not in plot and name != "."
+        f"the default plot refers to {name!r}, which does not exist"
+        for name in named
+        if name not in plot and name != "."
     )
 
 

@@ -89,7 +89,7 @@ class Parts:
     checksums: Checksums
 
     def reopened(self, file: hdf5.File) -> "Parts":
-        """Switch every part to the reopened file, and return the parts."""
+        """Connect every part to the reopened file, and return the parts."""
         for each in self.grown:
             each.reopen(file)
         self.checksums.reopen(hdf5.group(file, "entry"))

@@ -206,7 +206,9 @@ class DataFile(SampleReader):
         return as_rows(self.columns_of(event))
 
     def entries_of(self, event: type[Event]) -> list[dict[str, Any]]:
-        """Rows of a journalled event with bench `time`; columns that an older file lacks are those of its sentences."""
+        """Rows of a journalled event, with bench `time`; columns missing from an older file are extracted from its
+        journal's sentences.
+        """
         entries = [entry for entry in self.events if entry.kind == event.__name__]
         rows = self.rows_of(event) or [{}] * len(entries)
         return [

@@ -72,8 +72,8 @@ class Recorder:
 
     Samples are on the disk within a second, journalled events almost at once. The next call after a disk error raises
     DataFileError, once; later data are not recorded, and earlier data stay readable. A disk that is too slow causes the
-    same error: a call waits for it at most `hold_up` seconds, which is non-zero only in virtual time. `chunk_time` is
-    the duration of a chunk of samples [s].
+    same error; a call waits for the disk for at most `hold_up` seconds, which is non-zero only in virtual time.
+    `chunk_time` is the duration of a chunk of samples [s].
 
     `metadata` is stored as strings under /entry/metadata, `tables` (such as {"prediction": ...}) under /entry. `events`
     are those of the protocol whose tables the file needs. Raises InvalidInput, without creating a file, if `path`

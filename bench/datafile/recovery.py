@@ -1,5 +1,5 @@
-"""Recovery of a clean file from one whose writer was killed, whose disk was full or that was truncated, or from one of
-an old version.
+"""Recovery of a clean file from a file whose writer was killed, whose disk was full, that was truncated, or that has an
+old format.
 
 The original is not changed. The copy has the intact data in the present layout, with checksums.
 """
@@ -36,11 +36,11 @@ Row = Mapping[str, Any]
 
 
 def add_lost_events(entry: hdf5.Group, lines: Sequence[Row]) -> tuple[int, int]:
-    """Append the rows that only the journal has to the tables of events and points; returns the numbers of added events
-    and points.
+    """Append, to the tables of events and points, the rows that are found only in the journal. Returns the numbers of
+    added events and points.
 
     Points are checked separately, because a point can be missing although its event is present. Raises DataFileError,
-    without appending, for the journal of another file, which is recognised by a different beginning.
+    without appending, for the journal of another file, which is recognised because its beginning differs.
     """
     points = [line["point"] for line in lines if "point" in line]
     events = _beyond(hdf5.group(entry, "events"), lines, ("time", "kind"))
@@ -61,8 +61,8 @@ def add_lost_events(entry: hdf5.Group, lines: Sequence[Row]) -> tuple[int, int]:
 def _beyond(
     table: hdf5.Group, rows: Sequence[Row], compared: Sequence[str] | None = None
 ) -> list[tuple[hdf5.Dataset, NDArray[Any]]]:
-    """Every dataset of a table with the rows to add to it. Earlier rows must equal those of the table; otherwise raises
-    DataFileError.
+    """Every dataset of a table, with the rows of the journal to add to it. Raises DataFileError unless the journal's
+    earlier rows equal those of the table.
     """
     new: list[tuple[hdf5.Dataset, NDArray[Any]]] = []
     for name in table:
@@ -89,8 +89,8 @@ NOTE = "recovery"
 class Recovery:
     """Result of a recovery: the new file, its rows of samples, and the numbers of events and points from the journal.
 
-    `lost` holds, by part, the number of counted rows of the original that the copy lacks. `damage` names objects that
-    are missing, or were copied although they differ from their checksum.
+    `lost` holds, by part, the number of rows that were written to the original but are missing from the copy. `damage`
+    names objects that are missing, or that were copied although they do not match their checksum.
     """
 
     target: Path

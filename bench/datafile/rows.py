@@ -46,7 +46,7 @@ class Packer:
 
 
 def pack(chunks: NDArray[Any]) -> list[bytes]:
-    """The bytes of chunks, shape (n, rows), after the filters `hdf5.FILTERS`: of each chunk the first bytes of all
+    """The bytes of `chunks`, shape (n, rows), after the filters `hdf5.FILTERS`: for each chunk the first bytes of all
     values, then the second bytes, and so on, compressed.
     """
     n, size = len(chunks), chunks.dtype.itemsize

@@ -89,7 +89,9 @@ CHUNK_TIME = 0.5
 """Duration of a chunk of samples [s]; in a real-time run, the longest time for which samples are buffered."""
 
 VIRTUAL_CHUNK_TIME = 2.0
-"""The same in virtual time, which runs a hundred times faster: larger chunks take half the time to compress."""
+"""Duration of a chunk of samples in virtual time [s], which runs a hundred times faster: compressing larger chunks
+takes half the time.
+"""
 
 
 class Samples:

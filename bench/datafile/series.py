@@ -161,8 +161,8 @@ class SampleReader:
         return RecordedRun(number, rows, series, drive, Series("time", "time since arming", "s", self.time, rows))
 
     def raw_values(self, name: str, run: int) -> RawValues:
-        """The values received in `run` from a channel's sensor with a free-running clock; empty if the channel has no
-        such sensor.
+        """The values received in `run` from the channel's sensor, if its clock is free-running; empty for any other
+        channel.
         """
         sensor = [channel.name for channel in self.channels].index(self._channel_named(name).name)
         columns = ("index", "time", "code", "arrival")

@@ -39,7 +39,7 @@ KINDS = frozenset("iufSb")
 
 
 class _Judge:
-    """Check of every object of a file of `size` bytes, each once."""
+    """Checks every object of a file of `size` bytes, each once."""
 
     def __init__(self, size: int) -> None:
         self._size = size

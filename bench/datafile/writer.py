@@ -138,12 +138,12 @@ class DataFileWriter:
         self._point_fields = tuple(skeleton.point_type.model_fields)
 
     def has_table(self, event: type[Event]) -> bool:
-        """Whether the file has the table of an event, or the event has none."""
+        """Whether the event can be stored: the file has its table, or the event has none."""
         return (table := event_table(event)) is None or table.name in self._parts.rows
 
     @property
     def full_chunks(self) -> int:
-        """Number of pending chunks of samples."""
+        """Number of complete chunks among the pending samples."""
         return self._parts.samples.full_chunks
 
     def add_block(self, time: float, run: int, first: int, counts: Counts, drive: NDArray[np.float32]) -> None:

@@ -64,7 +64,7 @@ class Engine:
         return self._output.state
 
     def run(self, plan: Plan) -> Ending:
-        """Run `plan` until it ends or is ended early.
+        """Run `plan` to its end, or until it is ended early.
 
         An error of the rig, data file, plan or analysis is returned as an ending. After any other error, the output is
         cut and the error is raised.

@@ -30,7 +30,9 @@ class Ending:
         return cls("failed", str(error), error.cause)
 
     def then(self, later: "Ending | None") -> "Ending":
-        """Combine this ending with a `later` one: the worse status, both reasons, and the cause of this one."""
+        """Combine this ending with a `later` one: the worse of the two statuses, both reasons, and this ending's
+        cause.
+        """
         if later is None:
             return self
         status = max(self.status, later.status, key=SEVERITY.index)
@@ -54,7 +56,7 @@ class Operator(Protocol):
         ...
 
     def confirm(self, request: str) -> bool:
-        """Return True once `request` is done, or False if it is declined, which ends the run.
+        """Return True once `request` has been carried out, or False if it is declined, which ends the run.
 
         May block for a long time.
         """
@@ -79,7 +81,8 @@ _Made = tuple[str, Cause]
 class Requests:
     """Requests to end a run, from any thread or signal handler: stop, abort and halt, in ascending strength.
 
-    A request is never withdrawn. Plain flags need no lock, which could deadlock in a signal handler.
+    A request is never withdrawn. Plain flags are used because they need no lock, which could deadlock in a signal
+    handler.
     """
 
     def __init__(self) -> None:

@@ -45,7 +45,7 @@ class Loop:
         self.output = output
         self._guard, self._stream, self._requests = guard, stream, requests
         self.fall: FallWatch | None = None
-        """Detects the fall of the mounted block; None without a mounted specimen."""
+        """Detector of a fall of the mounted block; None if no specimen is mounted."""
         self._over: Violation | None = None
         self._runaway: Violation | None = None
 
@@ -54,7 +54,7 @@ class Loop:
         self._over = self._runaway = None
         self.check_requests()
         self.output.arm(reason)
-        # a halt requested while the rig was being armed had no enable line to cut
+        # a halt requested while the rig was being armed could not yet cut the enable line
         self.check_requests()
 
     def exchange(self) -> Exchange:
@@ -201,7 +201,7 @@ class SineDrive:
         self._cycles = None
 
     def sweep(self, step: Sweep) -> Outcome:
-        """Drive the legs of the sweep, starting at the present amplitude and frequency."""
+        """Drive the segments of the sweep, starting at the present amplitude and frequency."""
         output = self._loop.output
         output.source.require_silence("legs")
         oscillator = output.source.oscillator
@@ -267,7 +267,7 @@ class PreparedDrive:
         """
         output = self._loop.output
         if output.state is not State.RUNNING:
-            raise InvalidInput("prepared drive while the bench is", str(output.state), "arm it first")
+            raise InvalidInput("state of the bench before a prepared drive", str(output.state), "arm the bench first")
         volts = np.asarray(step.volts, dtype=np.float64)
         output.source.require_playable(volts)
         if (refused := self._guard.refusal(volts)) is not None:

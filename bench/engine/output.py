@@ -52,9 +52,7 @@ Array = NDArray[np.float64]
 
 
 class DriveSource:
-    """Generates the drive block by block, from a prepared drive while one is playing and otherwise from the
-    oscillator.
-    """
+    """Source of the drive, block by block: the prepared drive while one is playing, otherwise the oscillator."""
 
     def __init__(self, sample_rate: float, drive_range: float) -> None:
         self.oscillator = Oscillator(sample_rate)
@@ -168,7 +166,7 @@ class Output:
         """Samples read since the rig was armed."""
         self._run = 0
         self.stalls: Stalls | None = None
-        """Detector of periods in which the program did not run; None in virtual time."""
+        """Detector of stalls, periods in which the program did not run; None in virtual time."""
         self.stalled = 0.0
         """Longest time during the last exchange in which the program did not run [s]."""
         self._exchanged = now()
@@ -188,7 +186,7 @@ class Output:
 
     @property
     def begins(self) -> int:
-        """Index of the first sample that a new command affects: after those queued in the rig."""
+        """Index of the first sample that a new command affects: the first one after those queued in the rig."""
         return self.read + self._rig.lead
 
     def arm(self, reason: str) -> None:
@@ -258,7 +256,7 @@ class Output:
         return ending
 
     def ending_of(self, work: Callable[[], object]) -> Ending | None:
-        """Carry out `work`. Returns an ending if it fails, else None."""
+        """Carry out `work`. Returns the corresponding ending if it fails, else None."""
         try:
             work()
         except Ended as ended:

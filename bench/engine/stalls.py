@@ -14,7 +14,8 @@ _KEPT = 16
 
 
 class Stalls:
-    """Context manager that runs a thread of short sleeps. A sleep that ends much too late reveals a stall.
+    """Context manager that runs a thread which repeatedly sleeps for a short time. A sleep that ends much too late
+    reveals a stall.
 
     A slow call, a slow disk or a long computation in another thread does not delay this thread; a stopped or suspended
     process, a computer without free processors, or exhausted memory does.
@@ -51,7 +52,7 @@ class Stalls:
 
 
 def in_words(seconds: float) -> str:
-    """Message that states a stall as the cause, with the remedy."""
+    """Message that states a stall of this duration as the cause, with the remedy."""
     return (
         f"the operating system did not run this program for {seconds:.2f} s (process stopped, computer suspended or"
         " overloaded): close other programs, and disable power saving"

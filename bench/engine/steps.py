@@ -19,7 +19,7 @@ from sim.specimen import Specimen
 
 @dataclass(frozen=True)
 class OperatorAction:
-    """Operator action on the bench at rest, described by `request`. Returns `Done`.
+    """Action, described by `request`, that the operator carries out on the bench at rest. Returns `Done`.
 
     `specimen` is the specimen on the table afterwards. `amount` is the amount involved in the task, see
     `drivers.rig.OperatorTask`; by default the nominal stiffness [N/m] of the specimen's spring, if it has one.
@@ -82,8 +82,8 @@ class Dwell:
 
 @dataclass(frozen=True)
 class SetHarmonics:
-    """Blend to `shares`: complex shares of the set amplitude for the fundamental, second harmonic and so on, as in
-    `bench.control.oscillator`. A `Sweep` resets them.
+    """Change smoothly to `shares`: complex fractions of the set amplitude for the fundamental, second harmonic and so
+    on, as in `bench.control.oscillator`. A `Sweep` resets them.
 
     The change lasts `blend` cycles. It begins at the start of cycle number `cycle` of the present count, or at once if
     `cycle` is None or that cycle has begun.
@@ -159,7 +159,7 @@ class Played:
 
 @dataclass(frozen=True)
 class Measured:
-    """Cycles of a dwell, in order; fewer than requested where samples were missing."""
+    """Cycles of a dwell, in order; they are fewer than requested if samples were missing."""
 
     cycles: tuple[Cycle, ...]
 

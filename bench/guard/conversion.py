@@ -1,4 +1,4 @@
-"""Conversion of a block's counts to values, and the range of values of each channel."""
+"""Conversion of a block's counts to values, and the smallest and largest value of each channel."""
 
 from dataclasses import dataclass
 

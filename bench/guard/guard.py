@@ -255,7 +255,9 @@ class Guard:
         self._ramp_done = 0
 
     def _gain(self, ahead: int | NDArray[np.int64]) -> float | NDArray[np.float64]:
-        """Factor on the command, `ahead` samples from now: half a cosine from its start value to zero."""
+        """Factor on the command, `ahead` samples from now: half a cosine that falls from the ramp's initial value to
+        zero.
+        """
         if self._ramp_samples is None:
             return 1.0
         x = np.minimum((self._ramp_done + ahead) / self._ramp_samples, 1.0)

@@ -22,7 +22,7 @@ limit to the end of its stroke.
 
 
 class Warnings(Parameters):
-    """Share of each limit from which the operator is warned, once per run."""
+    """Fraction of each limit at which the operator is warned, once per run."""
 
     displacement: float = quantity(0.9, "1", f"displacement of the table: {_SHARE}", gt=0, le=1)
     velocity: float = quantity(0.9, "1", f"velocity of the table: {_SHARE}", gt=0, le=1)
@@ -64,7 +64,7 @@ Confirmable = Literal[
 
 
 class Limits(Parameters):
-    """Levels at which the guard aborts a run, as magnitudes in SI units."""
+    """Limits, as magnitudes in SI units, beyond which the guard aborts a run."""
 
     drive_voltage: float = quantity(8.0, "V", "largest command to the amplifier", gt=0, le=10)
     drive_slew: float = quantity(400.0, "V/s", "fastest change of the command", gt=0)
@@ -81,7 +81,7 @@ class Limits(Parameters):
     drift: float = quantity(0.080, "m", "largest drift of the specimen from rest", gt=0)
     sensor_loss: float = quantity(0.5, "s", "time without a valid sample of a sensor before the run aborts", gt=0)
     stuck: float = quantity(
-        1.0, "s", "time for which a sensor's count may stay constant while the table is driven", gt=0
+        1.0, "s", "time for which a sensor's count may remain constant while the table is driven", gt=0
     )
     late: float = quantity(0.5, "s", "largest delay of a block of samples", gt=0)
     clock: float = quantity(
@@ -117,7 +117,9 @@ class Ramps(Parameters):
 
 
 def ramp_refusal(limits: Limits, ramps: Ramps) -> InvalidInput | None:
-    """Error if the ramps, each half a cosine, exceed the slew limit when they start at the largest drive, else None."""
+    """Error if one of the ramps, each half a cosine, would exceed the slew limit when it starts at the largest drive;
+    None otherwise.
+    """
     shortest = min(ramps.stop, ramps.abort)
     steepest = 0.5 * pi * limits.drive_voltage / shortest
     if steepest <= limits.drive_slew:

@@ -36,7 +36,7 @@ _MEASURED_BY = {
     "force": TABLE_FORCE,
     "current": COIL_CURRENT,
 }
-"""Channels that measure a quantity directly; a limit beyond their range could never trip."""
+"""Channel that measures each quantity directly; a limit beyond its range could never trip."""
 
 _OF_TABLE = frozenset({"displacement", "velocity", "acceleration", "force", "current"})
 """Quantities of the table itself, which vanish once the drive is zero."""

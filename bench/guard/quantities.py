@@ -22,7 +22,7 @@ MOST_SKIPPED = 4000
 """Number of skipped samples after which the heating is updated."""
 
 ROUNDING = 1e-9
-"""Relative allowance for rounding errors in a mean over `MOST_SKIPPED` samples."""
+"""Relative allowance for the rounding errors of a mean over `MOST_SKIPPED` samples."""
 
 
 class WatchedQuantities:

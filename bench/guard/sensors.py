@@ -1,4 +1,4 @@
-"""Checks of the measurement itself: lost and stuck sensors, late blocks, and clocks that disagree."""
+"""Checks of the measurement itself: lost and stuck sensors, late blocks, and clocks that run at different rates."""
 
 from collections import deque
 from operator import lt
@@ -11,7 +11,7 @@ from bench.guard.conversion import Extremes
 from bench.guard.limits import Limits, Persistence, Violation
 from drivers.rig import Channel, Counts
 
-LATE, CLOCKS = "delay of a block of samples", "difference of the clocks"
+LATE, CLOCKS = "delay of a block of samples", "relative difference between the clocks"
 TIMING = (LATE, CLOCKS)
 """Quantities whose limits concern the arrival of samples, which depends on the computer and its connection to the
 device, not on the motion.
@@ -106,7 +106,7 @@ class SensorWatch:
 _SETTLED = 20.0
 """Time before two clocks are compared [s], long compared with the delay of a block."""
 _STRETCH = 5.0
-"""Length [s] of the windows at the start and at present; the least delayed block of each is compared."""
+"""Length [s] of the windows at the start of a run and at present; the least delayed blocks of the two are compared."""
 
 
 class TimeWatch:
@@ -121,7 +121,7 @@ class TimeWatch:
         self._recent: deque[tuple[float, float]] = deque()
 
     def check(self, now: float, end: int) -> list[Violation]:
-        """Violations for a block that arrived at `now` [s] and ends before sample `end`."""
+        """Violations for a block that arrived at `now` [s] and contains the samples before index `end`."""
         if self._origin is None:
             self._origin, self._first_end = now, end
             return []

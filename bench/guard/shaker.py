@@ -14,8 +14,8 @@ Motion = TypeVar("Motion", float, NDArray[np.float64], NDArray[np.complex128])
 class ShakerModel:
     """Estimates force and current where no channel measures them.
 
-    `mass` is the mass of everything that moves with the table, including the specimen [kg], `stiffness` that of the
-    suspension [N/m], and `force_constant` that of the coil [N/A].
+    `mass` is the mass of everything that moves with the table, including the specimen [kg], `stiffness` the stiffness
+    of the suspension [N/m], and `force_constant` the force constant of the coil [N/A].
     """
 
     mass: float
@@ -31,11 +31,13 @@ class ShakerModel:
         return (self.force(acceleration) + self.stiffness * displacement) / self.force_constant
 
     def largest_force(self, acceleration: float) -> float:
-        """Largest magnitude of the force [N] up to this magnitude of the acceleration [m/s2]."""
+        """Largest magnitude of the force [N] for this largest magnitude of the acceleration [m/s2]."""
         return abs(self.mass) * acceleration
 
     def largest_current(self, acceleration: float, displacement: float) -> float:
-        """Upper bound of the current's magnitude [A] up to these magnitudes of acceleration and displacement."""
+        """Upper bound of the current's magnitude [A] for these largest magnitudes of acceleration [m/s2] and
+        displacement [m].
+        """
         return (self.largest_force(acceleration) + abs(self.stiffness) * displacement) / abs(self.force_constant)
 
     def current_amplitude(self, amplitude: Array, omega: Array) -> Array:

@@ -32,7 +32,8 @@ CYCLES, MEMBERS = 1500, 16
 
 @dataclass(frozen=True, eq=False)
 class LongTerm:
-    """Long-term motion with the spring `beta` at `omega` [rad/s]. The rocking orbit there has the gain `orbit`.
+    """Long-term motion with the spring `beta` at `omega` [rad/s]. `orbit` is the gain of the rocking orbit at this
+    point.
 
     If the orbit on the table is `stable`, the motion is the orbit. The motion repeats after `repeats` cycles; 0 if it
     does not repeat, or if the block falls. `gains`, shape (n,), are the gains of the peaks of the last cycles; it is
@@ -53,7 +54,7 @@ class LongTerm:
     falls: float = nan
 
     def gain(self, of: Callable[[NDArray[np.float64]], np.float64]) -> float:
-        """Statistic `of` the gains; NaN if the block falls."""
+        """Value of the function `of`, such as a mean, for the gains; NaN if the block falls."""
         return float(of(self.gains)) if self.gains.size else nan
 
 
@@ -66,7 +67,8 @@ def long_term(
     cycles: int = CYCLES,
     members: int = MEMBERS,
 ) -> LongTerm:
-    """Long-term motion near the rocking orbit of `branch` after `cycles` cycles, also of `members` draws from `known`.
+    """Long-term motion after `cycles` cycles near the rocking orbit of `branch`, for its specimen and for `members`
+    specimens drawn from `known`.
 
     The amplitude of the table's acceleration and its harmonics up to number `harmonics` are held at those of the orbit.
     Raises NoOrbit if there is no such orbit on the table.

@@ -52,7 +52,8 @@ def bands(
 
     With `members` > 0, the band is from a Monte Carlo simulation with that number of draws. Otherwise it is to first
     order: the gain is computed one standard uncertainty to either side along each independent direction (GUM 5.1.4,
-    note 2), and the band is symmetric. Where the motion exists on only one side, that side is used.
+    note 2), and the band is symmetric. Where the motion exists on only one side, the result of that side is used for
+    both.
     """
     best = np.asarray(alpha_2, dtype=np.float64)
     of: dict[Specimen, list[Specimen]] = {}

@@ -33,8 +33,8 @@ def map_table(
     """Table with one row for each branch that exists at each point, sorted by stiffness, then frequency.
 
     If the uncertainties of the specimen are given as `known`, additional columns contain the band of alpha_2. A map of
-    several blocks is kept in the `store`, if there is one, and continues where that ends. Raises SchedulerUnavailable
-    if the requested scheduler does not respond.
+    several blocks is kept in the `store`, if there is one, and continues after the last block stored there. Raises
+    SchedulerUnavailable if the requested scheduler does not respond.
     """
     betas, omegas = np.sort(request.beta), np.sort(request.omega)
     amplitude = amplitude_of(specimen, request)
@@ -58,8 +58,8 @@ def map_table(
 
 
 class _Steps:
-    """Progress of a map over its blocks, each of which has the same number of steps. With one block, each step is a
-    phase; with several, the map is.
+    """Progress of a map over its blocks, each of which has the same number of steps. With one block, each step is
+    reported as a phase; with several, the entire map is one phase.
     """
 
     def __init__(self, progress: Progress, total: int, size: int, count: int) -> None:
@@ -107,7 +107,7 @@ def _block(made: GainMap, request: MapRequest, known: SpecimenKnowledge | None, 
 
 
 def _joined(tables: list[Table]) -> Table:
-    """One table of the rows of several."""
+    """One table with the rows of several tables."""
     if len(tables) == 1:
         return tables[0]
     return {

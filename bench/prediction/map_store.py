@@ -25,7 +25,7 @@ STATE, OWN = "state.npz", "unfinished-map"
 """Names of the state and of an empty file that marks the folder as one that may be removed."""
 
 TEXT = "<U16"
-"""Type of the columns of texts."""
+"""Type of columns that contain strings."""
 
 
 class MapStore:
@@ -44,10 +44,12 @@ class MapStore:
         self._load()
 
     def append(self, table: Table, after: Continuation) -> None:
-        """Append the rows of a block, and note the state `after` it. Raises OSError."""
+        """Append the rows of a block, and save the state `after` it. Raises OSError."""
         if not self._columns:
             if self.folder.exists() and not (self.folder / OWN).exists():
-                raise InvalidInput("folder", str(self.folder), "it is not of an unfinished map; rename or remove it")
+                raise InvalidInput(
+                    "folder", str(self.folder), "it does not contain an unfinished map; rename or remove it"
+                )
             self.remove()
             self.folder.mkdir()
             (self.folder / OWN).touch()
@@ -80,7 +82,7 @@ class MapStore:
         replace(temporary, self.folder / STATE)
 
     def table(self) -> Table:
-        """All rows; their values are read from the files as they are used."""
+        """All rows; their values are read from the files when they are used."""
         return {
             name: Column(self._values(name, each["type"]), each["unit"], each["description"])
             for name, each in self._columns.items()

@@ -82,19 +82,21 @@ HERTZ = 0.05
 """Tolerance for a frequency stated to one decimal place [Hz]."""
 
 NEAR = 0.5
-"""Tolerance for the frequency of the least gain around the second mode [rad/s]: 3 %."""
+"""Largest difference between the frequency of least gain and that of the second mode [rad/s]: 3 % of the latter."""
 
 CLOSE = 0.3
-"""Tolerance for point C around the boundary of the gain region [rad/s]: 2 %."""
+"""Largest distance of point C from the boundary of the gain region [rad/s]: 2 % of its frequency."""
 
 PEAK = 0.1
-"""Tolerance for the peak of a spectrum around the paper's frequency [rad/s]."""
+"""Largest difference between the frequency of a spectrum's peak and that in the paper [rad/s]."""
 
 ALMOST = 30.0
 """Largest deviation from in-phase or counter-phase motion that counts as "almost" [degrees]."""
 
 MUCH = 10.0
-"""Ratio regarded as "much": the factor by which the paper magnifies u1 relative to theta."""
+"""Smallest ratio of theta to u1 that counts as "much" [rad/m]: the factor by which the paper magnifies u1 relative to
+theta.
+"""
 
 
 def harmonic_statements(specimen: Specimen, amplitude: float) -> list[Statement]:
@@ -251,7 +253,7 @@ def _listed(values: Mapping[float, float], form: str) -> str:
 
 
 ABOUT = 0.1
-"""Tolerance for the best gain around 0.5."""
+"""Largest difference between the best gain and 0.5."""
 
 
 def seismic_statement(curves: Sequence[SeismicCurve]) -> Statement:

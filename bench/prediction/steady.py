@@ -273,8 +273,8 @@ def table_of(values: Mapping[str, NDArray[Any]]) -> Table:
 
 
 EXACT_POWER = 22
-"""Largest power of ten that a double represents exactly. A division by it rounds once, as does the conversion of a
-decimal number.
+"""Largest power of ten that a double represents exactly. A division by such a power rounds only once, as does the
+conversion of a decimal number.
 """
 
 NEAR_TIE = 1e-3

@@ -66,9 +66,7 @@ def stroke_fits(record: Accelerogram, request: StrokeFitRequest, configuration: 
 
 
 def change_at(fit: StrokeFit, periods: Array) -> Array:
-    """Relative change of the response spectrum at `periods` [s], same shape, all of which are periods of the
-    spectrum.
-    """
+    """Relative change of the response spectrum at `periods` [s], same shape; the spectrum must contain each of them."""
     return fit.change[np.searchsorted(fit.periods, periods)]
 
 

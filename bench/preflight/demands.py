@@ -37,7 +37,7 @@ class TableResponse(Protocol):
 
     @property
     def friction(self) -> float:
-        """Additional drive needed to overcome friction [V]: fundamental of a force that changes sign with the
+        """Additional drive [V] required to overcome friction: the fundamental of a force that changes sign with the
         velocity.
         """
         ...
@@ -135,7 +135,7 @@ def load(
     response: TableResponse | None,
     heating_time: float,
 ) -> dict[str, float]:
-    """Largest value of each quantity of table and shaker, by key, from `begin` [s] on; unknown quantities are absent.
+    """Largest value from `begin` [s] on of each quantity of table and shaker, by key; unknown quantities are absent.
 
     The heating, with time constant `heating_time` [s], is zero at the start of the programme, as in the guard after
     arming. It is also evaluated at the end of the last sine, which is held for `held` [s].
@@ -172,8 +172,8 @@ TOLERANCE = 1e-7
 
 @dataclass(frozen=True)
 class Travel:
-    """Largest magnitudes of the displacement at either laser and of the drift [m], and the time [s] at which the block
-    `toppled`; None if it did not topple, or if this is not evaluated.
+    """Largest magnitudes of the displacement at each laser and of the drift [m]. `toppled` is the time [s] at which the
+    block toppled; None if it did not topple, or if toppling was not evaluated.
     """
 
     storey_1: float
@@ -185,8 +185,8 @@ class Travel:
 def travel_demands(
     travels: Sequence[Travel], halves: tuple[float, float], off_middle: float
 ) -> dict[str, NDArray[np.float64]]:
-    """Laser and drift demands of each specimen, shape (n,), as in `laser_demands`. At rest, the storeys are away from
-    mid range by the fraction `off_middle` of half the range.
+    """Laser and drift demands of each specimen, shape (n,), as in `laser_demands`. At rest, the storeys are at a
+    distance of `off_middle` times half the range from mid range.
     """
     moved = np.array([(each.storey_1, each.storey_2, each.drift) for each in travels]).T
     found = laser_demands(moved[0], moved[1], moved[2], halves)
@@ -200,8 +200,8 @@ def stage_travels(
     reference: Literal["ground", "table"],
     catch_angle: float,
 ) -> list[Travel]:
-    """Travels of each specimen under its programme, started from rest, evaluated from `begin` [s] until the end of the
-    programme or the fall of the block.
+    """Travels of each specimen under its programme, which starts from rest; evaluated from `begin` [s] until the end of
+    the programme or the fall of the block.
 
     The programmes differ only in their amplitudes. `reference` is the mounting of the lasers. From `catch_angle` [rad]
     on, the block counts as fallen.
@@ -234,7 +234,7 @@ UNKNOWN_SHAKER = {
     "current": "the force constant is unknown: set hardware.moving_mass and hardware.force_constant",
     "heating": "the force constant is unknown: set hardware.moving_mass and hardware.force_constant",
 }
-"""Reasons given when quantities of the shaker are not predicted."""
+"""Reason, by quantity of the shaker, why it is not predicted."""
 
 
 UNPROBED = {
@@ -242,7 +242,7 @@ UNPROBED = {
     "drive_slew": "unknown table: determined by the probes, within limits.drive_slew",
     **UNKNOWN_SHAKER,
 }
-"""Reasons that apply to a table that the run itself probes."""
+"""Reason, by quantity, why it is not predicted for a table that the run itself probes."""
 
 
 def demands_of(known: Mapping[str, float], where: str, configuration: BenchConfiguration) -> tuple[Demand, ...]:

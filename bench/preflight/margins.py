@@ -31,7 +31,7 @@ class Demand:
 
 @dataclass(frozen=True)
 class Stage:
-    """Part of a run: the legs of the table motion from rest, and the estimated probability of success, if known."""
+    """Part of a run: the segments of the table motion from rest, and the estimated probability of success, if known."""
 
     name: str
     legs: tuple[Leg, ...]
@@ -205,7 +205,7 @@ def margins_table(margins: Sequence[Margin]) -> Table:
 
 
 def drive_table(stages: Sequence[Stage]) -> Table:
-    """Table with one row for each leg of the planned drive; every stage starts at zero drive."""
+    """Table with one row for each segment of the planned drive; every stage starts at zero drive."""
     rows = [(stage, leg) for stage in stages for leg in stage.legs]
     chances = [nan if stage.chance is None else stage.chance for stage, _ in rows]
     return {
@@ -213,9 +213,11 @@ def drive_table(stages: Sequence[Stage]) -> Table:
         "chance": Column(
             np.array(chances), "1", "estimated probability that the start succeeds; NaN if it is no start"
         ),
-        "duration": Column(np.array([leg.duration for _, leg in rows]), "s", "duration of the leg"),
+        "duration": Column(np.array([leg.duration for _, leg in rows]), "s", "duration of the segment"),
         "amplitude": Column(
-            np.array([leg.amplitude for _, leg in rows]), "m/s2", "table acceleration at the end of the leg"
+            np.array([leg.amplitude for _, leg in rows]), "m/s2", "table acceleration at the end of the segment"
         ),
-        "omega": Column(np.array([leg.omega for _, leg in rows]), "rad/s", "circular frequency at the end of the leg"),
+        "omega": Column(
+            np.array([leg.omega for _, leg in rows]), "rad/s", "circular frequency at the end of the segment"
+        ),
     }

@@ -48,7 +48,7 @@ def follow(
     """
     configuration = prepared.configuration
     follower = make()
-    # the follower comes first, so that it processes a block before the plan continues
+    # the follower is the first subscriber, so that it processes a block before the plan continues
     heard = [follower, *subscribers]
     plan = _watched(prepared.plan(), follower)
     replayed = replay(record, plan, configuration, clock=VirtualClock(), subscribers=heard)

@@ -61,7 +61,7 @@ class Comparison:
         paths = (*(table.path for table in EVENT_TABLES.values()), *record.own_tables)
         self._own: dict[str, list[Mapping[str, Any]]] = {path: [] for path in paths}
         self._entries = {path: kind for kind, path in ENTRY_PATHS.items()}
-        """Kind of the journal entries for each table, by path, that has one row per entry."""
+        """Kind of the journal entries of each table that has one row per entry, by the table's path."""
 
     def __call__(self, event: Event) -> None:
         if isinstance(event, Acquired):
@@ -222,7 +222,7 @@ def _plain(value: Any) -> Any:
 
 
 def _are_sentences(was: Any, now: Any) -> bool:
-    """Whether both are sentences, which depend on the wording version, rather than names, codes or JSON."""
+    """Whether both values are sentences, which depend on the wording version, and not names, codes or JSON."""
     if isinstance(now, Enum) or not (isinstance(was, str) and isinstance(now, str) and was and now):
         return False
     return any(" " in text and text[0] not in "{[" for text in (was, now))

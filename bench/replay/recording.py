@@ -42,7 +42,7 @@ class RunRecording:
 
     @property
     def stretches(self) -> Sequence[tuple[int, int]]:
-        """First sample and length of each gap-free section."""
+        """Index of the first sample and number of samples of each section without gaps."""
         return [(stretch.first, stretch.length) for stretch in self._stretches]
 
     def counts(self, first: int, n: int) -> Counts:

@@ -25,7 +25,8 @@ LONGEST_WAIT = 1.0
 
 
 class PacedClock:
-    """Clock that shows the recorded time, at `speed` times real time. No block is late, however slow the computer.
+    """Clock that shows the recorded time and runs at `speed` times real time. No block is late, however slow the
+    computer.
 
     With a real-time clock, blocks that were recorded in time could be late for the guard.
     """

@@ -107,7 +107,7 @@ def closed(rig: Rig) -> None:
 
 
 BEFORE_CLOSE = [fresh, armed, loaded, playing, stopped, halted, starved]
-"""All states of an open rig, as functions that bring a rig into them."""
+"""All states of an open rig: for each, the function that brings a rig into it."""
 AT_REST = [fresh, stopped, halted, starved]
 UNDER_WAY = [armed, loaded, playing]
 QUANTITIES = ("displacement", "acceleration", "force", "current", "voltage")
@@ -127,7 +127,7 @@ class RigConformance:
     drive = 0.4
     """Largest voltage that the tests output [V]."""
     reacts = "table_acceleration"
-    """Name of the channel that responds fastest to the drive."""
+    """Name of the channel whose response to the drive is the fastest."""
     reaction_time = 0.1
     """Time within which the channel `reacts` must respond to a step of the drive [s]."""
 

@@ -22,7 +22,7 @@ def held() -> dict[str, int]:
 
 
 def held_at_last(allowed: dict[str, int]) -> dict[str, int]:
-    """Wait until the resources held are within `allowed`, or for a time-out, and return them."""
+    """Wait until the resources held are within `allowed`, or until a time-out, and return them."""
     deadline = time.monotonic() + _PATIENCE
     now = held()
     while any(count > allowed[kind] for kind, count in now.items()) and time.monotonic() < deadline:

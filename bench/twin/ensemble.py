@@ -1,4 +1,6 @@
-"""Ensemble of specimens drawn within their uncertainty, under the same table motion, and the gain of each."""
+"""Ensemble of specimens drawn from the uncertainty of one specimen, under the same table motion, and the gain of
+each.
+"""
 
 from collections import deque
 from collections.abc import Sequence
@@ -63,7 +65,8 @@ class Ensemble:
     def feed(self, acceleration: Array) -> Array:
         """Compute u1, u2 [m] and theta [rad], shape (3, n_specimens, n), for table accelerations [m/s2], shape (n,).
 
-        Values after the fall of a block are NaN. Raises InvalidInput for accelerations that are not finite.
+        The values of a specimen are NaN after its block has fallen. Raises InvalidInput for accelerations that are not
+        finite.
         """
         motions = np.full((3, len(self._streams), acceleration.size), np.nan)
         for k, (stream, scale) in enumerate(zip(self._streams, self._scales, strict=False)):

@@ -51,9 +51,11 @@ _CUTOFF = 0.35
 far below it.
 """
 _HALF_WIDTH = 6
-"""Half the length of the impulse response [samples of the model]."""
+"""Half the length of the filter's impulse response [samples of the model]."""
 _KAISER = 5.65
-"""Window beta for 60 dB (Kaiser, 1974); with this length the transition band is 0.3 of the model's rate wide."""
+"""Parameter beta of the Kaiser window (Kaiser, 1974) for a stop-band attenuation of 60 dB; with this length the
+transition band is 0.3 of the model's rate wide.
+"""
 
 
 class Resampler:
@@ -130,7 +132,7 @@ class Residual:
 
 
 class Limit:
-    """Limit that trips once, as soon as a value has exceeded it for `persistence` [s]."""
+    """Limit that trips as soon as a value has exceeded it for `persistence` [s], and only once."""
 
     def __init__(self, limit: float | None, persistence: float) -> None:
         self.limit = limit

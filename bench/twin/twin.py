@@ -46,14 +46,14 @@ _ENDS = {
 
 
 class Applicability:
-    """Applicability of the model, tracked from the operator actions."""
+    """Applicability of the model to the mounted specimen, determined from the operator actions."""
 
     def __init__(self) -> None:
         self._mounted: Specimen | None = None
         self._against: set[OperatorTask] = set()
 
     def follow(self, event: SpecimenMounted) -> None:
-        """Take account of an operator action."""
+        """Update the applicability after an operator action."""
         self._mounted = event.specimen
         self._against.difference_update(_ENDS.get(event.work, ()))
         if event.work in _BEGINS:
@@ -75,9 +75,9 @@ class Applicability:
 Array = NDArray[np.float64]
 
 _LATE = 0.15
-"""Backlog at which the model drops members [s], but at least two blocks."""
+"""Backlog [s], of at least two blocks, at which the model drops members."""
 _BEHIND = 1.0
-"""Backlog at which the twin is switched off [s], but at least five blocks."""
+"""Backlog [s], of at least five blocks, at which the twin is switched off."""
 _NOT_IN_TIME = "the twin did not keep up and is off until the rig is armed again"
 
 

@@ -66,5 +66,5 @@ def test_clocks_that_drift_apart_end_a_long_run() -> None:
     bench = FaultyBench(None, DWELLING, lambda bench: bench.rig.faulty_clock.drift(0.002))
     story = run(bench, plan())
     assert story.status == "aborted"
-    assert "difference of the clocks" in story.reason
+    assert "relative difference between the clocks" in story.reason
     assert not story.armed

@@ -121,7 +121,7 @@ def _mode(fit: Fit, which: int, begin: float, omega: float) -> _Mode:
 
 
 def _stepped(extended: Fit) -> tuple[Array, Fit]:
-    """Shifts of all values to the best fit, and the fit with the remaining residual."""
+    """Shifts of all values that lead to the best fit, and the fit with the remaining residual."""
     moved = extended.moved(extended.residual)
     left = extended.residual - np.tensordot(moved, extended.jacobian, 1)
     return moved, replace(extended, residual=np.where(extended.residual == 0.0, 0.0, left))

@@ -1,6 +1,6 @@
 """Exact linear response of the frame on a moving table, in closed form in modal coordinates.
 
-Absolute displacements z of the storeys, table displacement x. The forces of the lower springs and dashpots act on the
+With z the absolute displacements of the storeys and x that of the table, the lower springs and dashpots act on the
 motion relative to the table:
 
     M z'' + C z' + K z = (k_1 x + c_1 x', 0)

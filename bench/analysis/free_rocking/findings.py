@@ -3,7 +3,7 @@
 Linearity: a smooth error, size sin(2 pi n x / range + phase), with `size` from the data sheet, and with uniformly
 distributed phase and number n of periods within the measuring range; it is common to all tilts. The fitted curvature
 absorbs its smooth part. Averaged over the phase, its mean square is that of two components, proportional to sin and cos
-- 1 of the displacement from the rest, each of size / sqrt(2).
+- 1 of the displacement from the rest position, each of size / sqrt(2).
 
 Timing: a laser with a free-running clock delays its values by up to one measuring period. The delay grows with the
 difference between the clocks and may jump back at any moment of a recording.
@@ -72,7 +72,7 @@ def analyse_tilt(seen: Recording, specimen: Specimen, least: float) -> Tilt:
     mean = float(abs(seen.height * swings.peaks).mean())
     if fit.rms > POOR * mean:
         raise NotRocking(
-            f"the fit of the exact motion leaves a residual of {1e3 * fit.rms:.2g} mm out of {1e3 * mean:.3g} mm: "
+            f"the fit of the exact motion leaves an rms residual of {1e3 * fit.rms:.2g} mm out of {1e3 * mean:.3g} mm: "
             "check that the block rocks on its two edges without yawing or sliding, then repeat the tilt"
         )
     straight = replace(seen, displacement=fit.straightened(seen.displacement))
@@ -91,7 +91,9 @@ clocks.
 """
 
 _NUMBERS, _RATES, _PHASES = 24, 12, 12
-"""Numbers of equally likely values: of periods, of clock differences and of initial delays."""
+"""Numbers of equally likely values over which the errors are averaged: of periods, of clock differences and of initial
+delays.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +119,9 @@ class LaserErrors:
         return np.sqrt(np.mean(changes**2, axis=1))
 
     def of_relation(self, relation: Relation, fit: RockingFit) -> Array:
-        """Shifts of the amplitude relation's r due to the components of the linearity error, shape (components,)."""
+        """Shifts of r, as determined by the amplitude relation, due to the components of the linearity error, shape
+        (components,).
+        """
         seen = block_face.displacement(relation.angles, fit.height, fit.block)
         rate = block_face.displacement_rate(relation.angles, fit.height, fit.block)
         # the fit has removed the zero and the curvature of this error from the relation's angles
@@ -125,7 +129,7 @@ class LaserErrors:
         return np.asarray(relation.weights @ ((self._components(seen) - found) / rate[:, None]))
 
     def _components(self, displacement: Array) -> Array:
-        """Components of the error [m], shape (n, components), at displacements from the rest, shape (n,)."""
+        """Components of the error [m], shape (n, components), at displacements from the rest position, shape (n,)."""
         size = self.accuracy.laser_linearity * self.measuring_range / np.sqrt(2.0 * _NUMBERS)
         turned = 2.0 * np.pi / self.measuring_range * displacement[:, None] * _middles(*WAVES, _NUMBERS)
         return size * np.concatenate((np.sin(turned), np.cos(turned) - 1.0), axis=1)

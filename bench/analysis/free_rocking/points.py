@@ -1,8 +1,8 @@
-"""Single points of the motion, each from the samples around it: impact times and turning points, and the restitution
-that follows from them. They assume only a smooth motion between impacts, and are therefore a check of a model fitted to
-the entire motion. A Butterworth low-pass delays a smooth motion without distortion: its gain has no term in omega^2, so
-its impulse response has no second cumulant, and a parabola passes unchanged. Its response to the kink at an impact has
-decayed after `AFTER`, and those samples are excluded.
+"""Single points of the motion, each determined from the samples around it: impact times and turning points, and the
+restitution that follows from them. They assume only a smooth motion between impacts, and are therefore a check of a
+model fitted to the entire motion. A Butterworth low-pass delays a smooth motion without distortion: its gain has no
+term in omega^2, so its impulse response has no second cumulant, and a parabola passes unchanged. Its response to the
+kink at an impact has decayed after `AFTER`, and those samples are excluded.
 
 Between impacts the energy is constant, so the largest angles before and after an impact give the restitution of the
 angular velocity, exactly and independent of time:
@@ -130,7 +130,7 @@ def functional_uncertainty(weights: Array, residual: Array, parameters: int) -> 
 
 @dataclass(frozen=True, eq=False)
 class Relation:
-    """r of each impact, and r of all impacts from the fitted line.
+    """Restitution r of each impact, and of all impacts together from the fitted line.
 
     `speed`, shape (n,), is the speed of each impact relative to that of a fall from alpha; `each` and
     `each_uncertainty`, shape (n,), are the values of single impacts and their standard uncertainties due to noise.

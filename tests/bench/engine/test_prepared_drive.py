@@ -157,7 +157,7 @@ def test_a_play_on_a_sine_or_on_a_bench_at_rest_is_refused() -> None:
     assert Bench(rig_that()).run(Arm(0.2), *sine, silent, Play(burst()), RampOut())[0].status == "completed"
     ending, _ = Bench(rig_that()).run(Play(burst()))
     assert ending.status == "failed"
-    assert "arm it first" in ending.reason
+    assert "arm the bench first" in ending.reason
 
 
 @pytest.mark.parametrize(("way", "status"), [("stop", "stopped"), ("abort", "aborted"), ("halt", "halted")])

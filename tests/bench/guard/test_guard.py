@@ -356,7 +356,7 @@ class TestTime:
     def test_clocks_that_disagree(self, ratio: float) -> None:
         watch = TimeWatch(1000.0, self.LIMITS)
         found = [one for k in range(400) for one in watch.check(7.0 + 0.1 * k * ratio, 100 * (k + 1))]
-        assert found[0].quantity == "difference of the clocks"
+        assert found[0].quantity == "relative difference between the clocks"
         assert found[0].sample < 35_000
 
     def test_single_late_blocks_are_no_clock(self) -> None:

@@ -52,7 +52,7 @@ OUT = Path("runs", "one")
         (Cause(CauseCode.DECLINED), "Complete the task"),
         (Cause(CauseCode.LIMIT, "drift"), "limit was exceeded (drift)"),
         (Cause(CauseCode.LIMIT, "delay of a block of samples"), "too slow (delay of a block of samples)"),
-        (Cause(CauseCode.LIMIT, "difference of the clocks"), "too slow"),
+        (Cause(CauseCode.LIMIT, "relative difference between the clocks"), "too slow"),
         (Cause(CauseCode.CLIENT_LOST), "did not respond"),
         (SafetyInputOpen("arming is refused", ("over-travel 1",)).cause, "Find the cause at the bench"),
         (DataFileError("its disk is 4096 events behind").cause, "Free disk space"),
