@@ -35,7 +35,7 @@ class Entry:
 
 @dataclass(frozen=True)
 class _Request:
-    """Request to end the run, with the number of blocks and journal entries before it."""
+    """Request to end the run, with the numbers of blocks and of journal entries before it."""
 
     blocks: int
     entries: int
@@ -109,7 +109,7 @@ class RecordedCourse:
         return time + (samples - end) / self._rate
 
     def opened(self, run: int, samples: int) -> Collection[str]:
-        """Safety inputs open after `samples` samples of `run`."""
+        """Names of the safety inputs that were open after `samples` samples of `run`."""
         since, names = self._opened.get(run, (0, []))
         return names if samples >= since else ()
 
