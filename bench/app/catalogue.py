@@ -80,8 +80,8 @@ def parameters_of(record: "DataFile", protocol: "Protocol[Any]", changed: dict[s
     """The stored parameters of a run, updated with `changed`. Raises InvalidInput for parameters unknown to this
     version.
 
-    A parameter that the file of an earlier version lacks stays absent where that is allowed; the run is then repeated
-    without it.
+    A parameter that may be None, and is missing from the file of an earlier version, is set to None instead of its
+    default: the run is then repeated without it.
     """
     from bench.config.validation import dotted, validated
 

@@ -254,7 +254,9 @@ class Campaign:
         return slice(begin, begin)
 
     def _starts(self) -> list[float]:
-        """Bench time of the first sample of each run [s]; the time of a block is that of its last sample."""
+        """Bench time of the first sample of each run [s], from the times of the blocks, which are those of their last
+        samples.
+        """
         blocks, rows, rate = self._file.blocks, self._file.rows, self.sample_rate
         ends = np.append(blocks["row"][1:], rows)
         first = np.flatnonzero(np.diff(blocks["run"], prepend=-1))

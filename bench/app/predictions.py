@@ -155,13 +155,16 @@ def predict(
     band: bool = False,
     **options: Any,
 ) -> SteadyPrediction | SeismicPrediction | Modes:
-    """Predict steady motions at `omega` [rad/s], the gain under a `record`, or, without either, the modes.
+    """Predict steady motions at `omega` [rad/s], the gain under a `record`, or, without either, the modes. Raises
+    InvalidInput.
 
-    `specimen` is a Specimen, a TOML file, or a specimen file (.json), by default that of the `configuration` or of the
-    paper. `beta` are spring labels, by default that of the specimen. `options` of a sine are `amplitude_factor` and
-    `members`, those of a record are the fields of `bench.prediction.requests.SeismicRequest`. `band` adds the
-    first-order uncertainty band of alpha_2, `members` the band from a Monte Carlo simulation with that many specimens.
-    Raises InvalidInput.
+    specimen : a Specimen, a TOML file, or a specimen file (.json); by default the specimen of the `configuration` or of
+        the paper.
+    beta : labels of the springs; by default the label of the specimen.
+    band : adds the first-order uncertainty band of alpha_2.
+    options : for a sine `amplitude_factor` and `members`, for a record the fields of
+        `bench.prediction.requests.SeismicRequest`. `members` adds the uncertainty band from a Monte Carlo simulation
+        with that many specimens.
     """
     chosen, known, bench = _known(specimen, configuration)
     if beta is None and chosen.label is None:

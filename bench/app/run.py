@@ -39,11 +39,13 @@ def run(
 ) -> Campaign:
     """Run a protocol and return its campaign, whose `status` states how it ended.
 
-    Parameters are taken from the mapping and from `more`. `specimen` is a specimen file (.json); `seed` is the seed of
-    a simulated bench, which runs in virtual time unless `realtime`. Results are written to the folder `out`, by default
-    runs/<protocol>-<date>. `operator` is called with each request to the person at the bench and must return True once
-    the task is done; without it, a simulated bench confirms every request, and a run on a real bench is refused.
-    `progress` is called with an activity and its completed fraction, 0 to 1.
+    parameters, more : parameters of the protocol, as a mapping and as keyword arguments.
+    specimen : specimen file (.json).
+    seed, realtime : seed of a simulated bench, and whether it runs in real instead of virtual time.
+    out : folder for the results, by default runs/<protocol>-<date>.
+    operator : called with each request to the person at the bench; must return True once the task is done. Without it,
+        a simulated bench confirms every request, and a run on a real bench is refused.
+    progress : called with an activity and its completed fraction, 0 to 1.
 
     Raises InvalidInput for a refusal before the table moves, and KeyboardInterrupt after Ctrl-C (or SIGTERM), once the
     output has been ramped to zero and the file closed as aborted.

@@ -185,8 +185,8 @@ class RunDisplay:
         self._told, self.preparing = self.time, True
 
     def expect(self, duration: float | None) -> None:
-        """Show the `duration` of the plan [s], None if unknown. It is shown from the opening of the rig until the run
-        reports its progress.
+        """Show the `duration` of the plan [s], None if unknown; called once the rig is open. The run's own reports of
+        progress replace it.
         """
         self.fraction, self.remaining, self.preparing = 0.0, nan if duration is None else duration, False
         self.reason, self._told = "", self.time

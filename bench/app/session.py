@@ -64,12 +64,15 @@ def run_session(
     opened: Callable[[Rig, Subscriber], None] = lambda _rig, _publish: None,
     progress: Progress = silent,
 ) -> SessionResult:
-    """Run a `prepared` protocol on its bench; write data file, figures and summary to the folder `out`. `opened` is
-    called before the table moves, with the rig and a function that publishes an event of the run; both may be used only
-    while the engine calls a subscriber. `about` (the operator's name, notes) is stored in the data file with the
-    metadata of the run. `progress` reports the stages before the rig is opened and after it is closed. Raises
-    InvalidInput before the table moves, or KeyboardInterrupt if an end was requested by then. Once the rig is armed,
-    every ending is a result with a status.
+    """Run a `prepared` protocol on its bench; write data file, figures and summary to the folder `out`.
+
+    opened : called before the table moves, with the rig and a function that publishes an event of the run; both may be
+        used only while the engine calls a subscriber.
+    about : name of the operator and notes, stored in the data file with the metadata of the run.
+    progress : receives the stages before the rig is opened and after it is closed.
+
+    Raises InvalidInput before the table moves, and KeyboardInterrupt if an end was requested before then. Once the rig
+    is armed, every ending is a result with a status.
     """
     started = time.monotonic()
     name = f"the protocol {protocol.name}"

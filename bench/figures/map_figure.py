@@ -33,7 +33,9 @@ FEWEST_LEVELS = 4
 """Least number of usual contour levels that a gain must cross; if it crosses fewer, other levels are drawn."""
 
 JUMP = 0.1
-"""Step in the frequency of least gain, as a fraction of the range, above which it counts as a jump between valleys."""
+"""Step in the frequency of least gain, as a fraction of the frequency range, above which it is treated as a jump
+between valleys.
+"""
 
 FOUND, LOST = "o", "X"
 MARK: Mapping[str, Any] = {

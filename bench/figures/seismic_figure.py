@@ -62,7 +62,7 @@ class ModelDrift:
 
 @dataclass(frozen=True, eq=False)
 class GainCurve:
-    """Gains against stiffness under one record, each shape (n,), in ascending order of `beta`.
+    """Gains against stiffness under one record; each array has shape (n,), in ascending order of `beta`.
 
     Gains are NaN where the run ended early; `toppled` is True where the block fell. `band` contains the lower and the
     upper end of the 95 % interval of alpha_2.

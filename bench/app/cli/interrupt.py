@@ -1,8 +1,8 @@
 """Handling of Ctrl-C, SIGTERM and a closed terminal in every phase of a command.
 
 While a rig is open, the first signal ends the run in an orderly way and the second cuts the output. Otherwise nothing
-has to be brought to rest: the first signal raises KeyboardInterrupt, and if the main thread cannot handle it, because
-it executes native code or waits, another thread ends the process.
+has to be brought to rest: the first signal raises KeyboardInterrupt. If the main thread cannot handle the signal,
+because it executes native code or waits, another thread ends the process.
 """
 
 import os
@@ -131,10 +131,10 @@ def leaving() -> Generator[None, None, None]:
 class Watch:
     """A thread that handles a signal when the main thread does not.
 
-    Python runs a signal handler in the main thread, between two bytecode instructions: it does not run while native
-    code runs or waits nor, on Windows before Python 3.14, during a wait for a lock. The number of the signal, however,
-    is written at once to a socket on which this thread waits. This thread ends the process only while the installed
-    handler allows it (`leavable`): never while a rig is open, and never under a handler of another program.
+    Python calls a signal handler in the main thread, between two bytecode instructions: not while native code runs or
+    waits nor, on Windows before Python 3.14, during a wait for a lock. The number of the signal, however, is written at
+    once to a socket on which this thread waits. This thread ends the process only while the installed handler allows it
+    (`leavable`): never while a rig is open, and never under a handler of another program.
     """
 
     def __init__(self) -> None:

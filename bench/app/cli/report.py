@@ -23,7 +23,7 @@ OVERWRITE = Annotated[
 ]
 
 BAND = "1.5:25"
-"""Default band [Hz] of the table for additional band-limited records: that of a seismic campaign."""
+"""Default band of the table [Hz] for additional band-limited records: the band of a seismic campaign."""
 
 Part = Literal["statements", "modes", "map", "histories", "spectra", "records", "seismic"]
 

@@ -167,8 +167,8 @@ def carry_out(
     realtime: bool,
     about: Mapping[str, str],
 ) -> "tuple[SessionResult | Exception, int | None]":
-    """Run a protocol and display its progress. Returns its result or error, and the exit code of the signal that
-    requested its end, or None. Raises InvalidInput if it is refused.
+    """Run a protocol and display its progress. Returns the result or the error of the run, and the exit code for the
+    signal that requested its end, or None. Raises InvalidInput if the run is refused.
     """
     from bench.app.cli.interrupt import interruptible
     from bench.app.cli.streams import lasting

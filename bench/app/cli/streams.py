@@ -9,8 +9,8 @@ from typing import Any, TextIO, cast
 class _Lasting:
     """A stream that ignores write errors: a closed pipe or terminal, or a full disk.
 
-    Nothing is written to it after the first error. Its buffer is then sent to the null device; otherwise the
-    interpreter would report the same error at exit.
+    After the first error, nothing more is written to the stream, and its buffer is sent to the null device; otherwise
+    the interpreter would report the same error at exit.
     """
 
     def __init__(self, stream: TextIO) -> None:

@@ -137,8 +137,8 @@ class AtTheConsole:
 def choose(*, serves_itself: bool, yes: bool, ask: bool, terminal: bool) -> Operator:
     """The operator of a run.
 
-    A bench that `serves_itself` performs the operator's actions unless `ask`; on a real bench the person at a
-    `terminal` is asked unless `yes`. Raises RockbenchError if nobody could answer.
+    A bench that `serves_itself` performs the operator's actions, unless `ask` is set. On a real bench, the person at
+    the `terminal` is asked, unless `yes` is set. Raises RockbenchError if nobody could answer.
     """
     if yes and ask:
         raise RockbenchError("--yes and --ask contradict each other: use only one of them")

@@ -46,7 +46,9 @@ PACKAGES = {
 
 
 class NoDisplay(InvalidInput):
-    """Error: no window can be opened on this system. `item` is the variable or library, `allowed` the remedy."""
+    """Error: no window can be opened on this system. `item` is the environment variable or library that prevents it,
+    `allowed` the remedy.
+    """
 
     def __init__(self, item: str, why: str, remedy: str) -> None:
         RockbenchError.__init__(self, f"rockbench gui cannot open a window: {why}; {remedy}, or use {HEADLESS}")

@@ -1,4 +1,4 @@
-"""The loop check: started like any other run, and shown line by line, each with its verdict once it is complete."""
+"""The loop check, which is started like any other run. Each line is shown with its verdict when it is complete."""
 
 from datetime import datetime
 from pathlib import Path

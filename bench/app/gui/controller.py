@@ -181,8 +181,8 @@ class Controller(QObject):
         return bench_status(link.status, scene.state, reason, link.silence)
 
     def check_plan(self, asked: PlanCheck, by: object) -> None:
-        """Request a plan check, also while a run is under way; `plan_checked` emits the result. It replaces an earlier
-        plan check requested `by` the same object.
+        """Request a plan check, also while a run is under way; `plan_checked` emits the result. A new request replaces
+        an earlier one made `by` the same object.
         """
         self.give_up(by)
         self._plan_checks[by] = SessionClient(asked, self._call)

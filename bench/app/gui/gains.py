@@ -146,8 +146,8 @@ def _line(
 
 @dataclass(frozen=True)
 class Difference:
-    """A point in the reference and in another run; a gain that was not measured is None. `uncertainty` is that of the
-    difference, expanded (k = 2), with the two gains assumed independent; NaN without both.
+    """A point in the reference and in another run; a gain that was not measured is None. `uncertainty` is the expanded
+    uncertainty (k = 2) of the difference, with the two gains assumed independent; NaN unless both were measured.
     """
 
     point: str

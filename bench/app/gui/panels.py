@@ -14,7 +14,7 @@ from bench.events import Event, OperatorAsked, PointFinished
 from drivers.rig import OperatorTask
 
 UNREAD = 700
-"""Time after the appearance of a question during which answers are ignored [ms], since nobody can have read it yet."""
+"""Time after the appearance of a question during which answers are ignored [ms]: nobody can have read it yet."""
 
 
 _AT_ZERO = "The output is at zero and the rig is stopped until you answer."

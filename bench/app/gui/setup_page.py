@@ -96,9 +96,7 @@ class DevicesPanel(QWidget):
 
 
 class SetupPage(QWidget):
-    """Shows and selects the configuration. It is edited in its file; another one can be opened here while no run is
-    active.
-    """
+    """Shows the configuration, and opens another one while no run is active. A configuration is edited in its file."""
 
     opened = Signal(object)
     """Emits the `BenchConfiguration` for the following runs."""
@@ -122,7 +120,7 @@ class SetupPage(QWidget):
         self._refresh()
 
     def open_configuration(self, path: Path) -> None:
-        """Use the configuration in a file; if it is invalid, show the reason and keep the current configuration."""
+        """Use the configuration in a file; for an invalid file, show the reason and keep the current configuration."""
         try:
             configuration = read_configuration(path)
         except RockbenchError as error:
@@ -132,7 +130,7 @@ class SetupPage(QWidget):
         self._use(configuration, path)
 
     def open_identified(self, path: Path) -> None:
-        """Use the identified specimen in a file; if it is invalid, show the reason and keep the current one."""
+        """Use the identified specimen in a file; for an invalid file, show the reason and keep the current specimen."""
         try:
             configuration = with_identified(self.configuration, read_specimen(path))
         except RockbenchError as error:

@@ -57,8 +57,8 @@ class Arrangement:
     """The specimen on the table and the target of laser 2, from the operator's actions.
 
     `face` is the height above the table [m] at which laser 2 measures the block's face, None while it measures storey
-    2. `tilt` is the rotation [rad] from which the block was released; the displacement measured on the face is zero
-    there.
+    2. `tilt` is the rotation [rad] from which the block was released; at this rotation, the displacement measured on
+    the face is zero.
     """
 
     block: bool = False

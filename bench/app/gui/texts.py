@@ -325,7 +325,9 @@ POINT_MARKS = {
     "overturned": ("✕", "alarm"),
     "not played": ("–", "calm"),
 }
-"""Mark of a point and level of its style, by its status; any other status has those of a finished point."""
+"""Mark of a point and level of its style, by status of the point; all other statuses have the mark and level of a
+finished point.
+"""
 EXPECTED = "≈ {time:%H:%M}"
 METERS = {
     "displacement": "table displacement",

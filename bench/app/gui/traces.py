@@ -156,7 +156,7 @@ class TracePlot(QWidget):
             self._fit(k, plot, line)
 
     def _fit(self, k: int, plot: Any, line: NDArray[np.float64]) -> None:
-        """Widen the axis at once, but narrow it only when it is much too wide, since every change of its range causes a
+        """Widen the axis at once, but narrow it only when it is much too wide, since every change of range causes a
         redraw.
         """
         most = max(float(np.nanmax(np.abs(line))) if np.isfinite(line).any() else 0.0, LEAST)

@@ -186,8 +186,8 @@ Kind = type[BaseException]
 
 
 class OwnErrors(QObject):
-    """Reports uncaught errors of any thread in the window's thread, each error once. The error is always logged; the
-    panel shows it unless it already shows a report, which may concern the bench.
+    """Reports the uncaught errors of all threads, each error once, in the window's thread. An error is always logged;
+    the panel shows it unless a report, which may concern the bench, is already shown.
     """
 
     _raised = Signal(object)

@@ -70,7 +70,7 @@ FLAGS = int(Qt.TextFlag.TextWordWrap | Qt.AlignmentFlag.AlignVCenter | Qt.Alignm
 
 
 class VerdictLabel(QLabel):
-    """Wrapped text in the largest font size with which it fits; the tooltip shows the complete text."""
+    """Wrapped text in the largest font size that fits; the tooltip shows the complete text."""
 
     def __init__(self) -> None:
         super().__init__(wordWrap=True)

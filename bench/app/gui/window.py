@@ -86,8 +86,8 @@ FIRST = (1280, 800)
 
 
 class Window(QMainWindow):
-    """The operator's window. Every part is a client of `controller`. `settings` stores the layout (None: not stored);
-    `queue` is the file of the queue (None: not stored). With `tour` the guided tour is shown.
+    """The operator's window. Every part is a client of `controller`. `settings` stores the layout and `queue` is the
+    file of the queue; either is not stored if None. With `tour`, the guided tour is shown.
     """
 
     def __init__(

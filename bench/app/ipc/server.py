@@ -91,11 +91,13 @@ answer.
 class SessionServer:
     """Serves the clients of a session, each by a sending and a receiving thread; the engine waits for none of them.
 
-    The `owner` is the client that started the session, None for a session that a terminal started. `lost(why)` is
-    called in a receiving thread when the owner has disconnected or is silent, and again after each reconnection.
-    Clients that `attach` may stop the run, and answer questions while the owner is lost. `pending`, called in a
-    receiving thread, returns whether the main thread is not polling for requests at present and must therefore be
-    interrupted.
+    owner : connection to the client that started the session; None for a session that a terminal started.
+    lost : called with the reason, in a receiving thread, when the owner has disconnected or is silent; may be called
+        repeatedly.
+    pending : called in a receiving thread; returns whether the main thread is not polling for requests at present and
+        must therefore be interrupted.
+
+    Clients that `attach` may stop the run, and may answer questions while the owner is lost.
     """
 
     def __init__(
