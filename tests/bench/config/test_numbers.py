@@ -142,7 +142,7 @@ def test_a_value_with_a_unit_is_converted(text: str, unit: str, value: float) ->
         ("20 deg", "1", "deg .* does not have the dimension of 1"),
         ("2 bananas", "m", "'bananas' is an unknown unit"),
         ("12 degC", "m", "dimension"),
-        ("7 m", "", "no unit"),
+        ("7 m", "", "without a unit"),
     ],
 )
 def test_a_unit_of_another_dimension_is_refused_naming_both(text: str, unit: str, said: str) -> None:

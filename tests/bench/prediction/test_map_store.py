@@ -94,6 +94,6 @@ def test_rows_of_other_inputs_are_discarded(tmp_path: Path) -> None:
 def test_a_folder_of_others_is_not_removed(tmp_path: Path) -> None:
     (tmp_path / "map").mkdir()
     (tmp_path / "map" / "thesis.txt").touch()
-    with pytest.raises(InvalidInput, match="not of an unfinished map"):
+    with pytest.raises(InvalidInput, match="does not contain an unfinished map"):
         MapStore(tmp_path / "map", {}).append(table(1.0), state(1))
     assert (tmp_path / "map" / "thesis.txt").exists()
