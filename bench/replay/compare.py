@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,12 @@ from bench.live_values import TwinEstimate
 from bench.replay.course import RecordedCourse
 
 ROUNDING = 1e-9
-"""Largest relative difference of results that is attributed to rounding on another processor or by another library."""
+"""Largest difference of results that is attributed to rounding on another processor or by another library, relative to
+the largest magnitude in the recorded column: a signal that crosses zero has no meaningful relative difference there.
+"""
+
+TWIN_ROUNDING = 1e-6
+"""The same for the live model, whose impacts amplify differences."""
 
 DRIVE_ROUNDING = 1e-6
 """Largest difference of the drive [V] that is attributed to rounding: far below the step of a 16-bit converter."""
@@ -110,7 +116,8 @@ class Comparison:
             elif broken_off is not None and path in self._entries:
                 common = entries[self._entries[path]]
             name = path.rpartition("/")[2].replace("_", " ")
-            _compare_rows(found, name, stored[:common], rows[:common], *same)
+            rounding = TWIN_ROUNDING if path == TwinEstimate.table else ROUNDING
+            _compare_rows(found, name, stored[:common], rows[:common], *same, rounding)
         return found
 
     def _compare_journal(self, found: Found, broken_off: str | None) -> list[tuple[str, str, int]]:
@@ -192,6 +199,7 @@ def _compare_rows(
     came: Sequence[Mapping[str, Any]],
     same_wording: bool,
     same_intervals: bool,
+    rounding: float = ROUNDING,
 ) -> None:
     """Compare the rows of a table field by field, except bench times and, for an older file, fields that depend on the
     wording or on the evaluation of uncertainties.
@@ -199,21 +207,21 @@ def _compare_rows(
     found.compared[what] = len(came)
     if len(stored) != len(came):
         found.differences.append(Difference(f"{len(stored)} rows of {what} recorded, {len(came)} replayed", what))
-    largest = 0.0
+    largest, scales = 0.0, _scales(stored)
     for number, (was, now) in enumerate(zip(stored, came, strict=False), 1):
         for name in (now.keys() & was.keys()) - {"time"}:
             if not (same_wording and same_intervals) and _are_sentences(was[name], now[name]):
                 continue
             if not same_intervals and any(part in name for part in OF_INTERVALS):
                 continue
-            apart = _apart(was[name], now[name])
-            if apart > ROUNDING:
+            apart = _apart(was[name], now[name], scales.get(name, 0.0))
+            if apart > rounding:
                 text = f"row {number} of {what}: {name} was {was[name]!r} and is {_plain(now[name])!r}"
                 found.differences.append(Difference(text, what))
             else:
                 largest = max(largest, apart)
     if largest > 0.0:
-        said = f"{what} differ by at most {largest:.1e} of the value"
+        said = f"{what} differ by at most {largest:.1e} of the largest value"
         found.differences.append(Difference(said, what, rounding=True))
 
 
@@ -228,14 +236,26 @@ def _are_sentences(was: Any, now: Any) -> bool:
     return any(" " in text and text[0] not in "{[" for text in (was, now))
 
 
-def _apart(was: Any, now: Any) -> float:
-    """Relative difference of two values; infinite for unequal values that are not numbers."""
+def _scales(rows: Sequence[Mapping[str, Any]]) -> dict[str, float]:
+    """Largest finite magnitude of each field with numbers."""
+    scales: dict[str, float] = {}
+    for row in rows:
+        for name, value in row.items():
+            if isinstance(value, int | float) and isfinite(value):
+                scales[name] = max(scales.get(name, 0.0), abs(value))
+    return scales
+
+
+def _apart(was: Any, now: Any, scale: float) -> float:
+    """Difference of two values relative to `scale` or the larger of them; infinite for unequal values that are not
+    numbers.
+    """
     was, now = (None if each is None or each != each else each for each in (was, now))
     if isinstance(now, str):
         return 0.0 if was == _clipped(now) or (was is None and not now) else np.inf
     if was is None or now is None or isinstance(was, str):
         return 0.0 if was is now else np.inf
-    return 0.0 if was == now else abs(was - now) / max(abs(was), abs(now))
+    return 0.0 if was == now else abs(was - now) / max(abs(was), abs(now), scale)
 
 
 def _clipped(text: str) -> str:
