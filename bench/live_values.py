@@ -63,10 +63,11 @@ class TwinEstimate(Event):
     """State of the live model and of the specimen at the last sample for which both are known, `seconds` after the
     start of `run`. `time` is the instant at which the block with that sample had been read.
 
-    `_low` and `_high` are the ends of the model's band, `_measured` the values of the lasers. `alpha_2` is available
-    once the protocol has published a gain. `residual` is the root mean square of measured minus modelled drift over the
-    last second, `excess` that of the measured drift outside the band, both relative to the largest drift so far. The
-    band is formed by `members` models together with the nominal model. Values that are not available are NaN.
+    Names that end in `_low` and `_high` denote the ends of the model's band, those in `_measured` the values of the
+    lasers. `alpha_2` is available once the protocol has published a gain. `residual` is the root mean square of
+    measured minus modelled drift over the last second, `excess` that of the measured drift outside the band, both
+    relative to the largest drift so far. The band is formed by `members` models together with the nominal model. Values
+    that are not available are NaN.
 
     `trace`, shape (n, 6), is the model's motion since the previous estimate, every 10 ms, with the columns TWIN_TRACE.
     """

@@ -43,7 +43,7 @@ class Reading:
 
 
 def refuse_choice(text: RecordText, choices: Choices, *names: str) -> None:
-    """Raise InvalidInput for the choice of a part that the file does not have."""
+    """Raise InvalidInput if a channel or column is chosen that the file does not have."""
     remedies = {
         "channel": "this format has no channels",
         "column": "a column can be selected only in a file of plain columns",

@@ -25,7 +25,7 @@ _PEAK = re.compile(rf"^\s*PEAK ACCELERATION\s*=\s*({NUMBER})\s+(\S+)", re.IGNORE
 
 
 def recognise(text: RecordText) -> bool:
-    """Whether the file begins with a corrected accelerogram and its channel."""
+    """Whether the file begins with a line that announces a corrected accelerogram and its channel."""
     return _START.match(text.lines[0]) is not None
 
 

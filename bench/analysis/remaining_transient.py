@@ -107,8 +107,8 @@ def _around(grid: Sequence[float], k: int) -> Array:
 
 
 def _modes(decays: Array, angles: Array, n: int) -> Array:
-    """A constant and both parts of each mode over `n` cycles, with amplitude 1 in the first cycle; shape (modes, n,
-    3).
+    """A constant, and the real and imaginary parts of each mode with amplitude 1 in the first cycle, over `n` cycles;
+    shape (modes, n, 3).
     """
     at = np.arange(n)
     turned = (decays.ravel() * np.exp(1j * angles.ravel()))[:, None] ** at

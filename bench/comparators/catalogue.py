@@ -21,7 +21,7 @@ from sim.rocking import MOST_IMPACTS, REST_ANGLE, TOLERANCE, Motion, State, moti
 from sim.specimen import Specimen
 
 PAPER_STEP = 1e-3
-"""Time step [s] of the paper, section 3.3."""
+"""Time step [s] used in section 3.3 of the paper."""
 
 SEISMIC_PARTS = 10
 """Number of parts into which a step with an impact is divided when the excitation is a record. The paper states only "a

@@ -30,7 +30,7 @@ WATCHED = (
 
 
 def dop853(problem: Problem, tolerance: float) -> Motion:
-    """scipy's DOP853 (Hairer, Norsett and Wanner, 1993) with a relative tolerance."""
+    """Integrate by scipy's DOP853 (Hairer, Norsett and Wanner, 1993) with this relative `tolerance`."""
     return integrate("DOP853", problem, tolerance)
 
 

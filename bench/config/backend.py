@@ -93,8 +93,8 @@ class RigBackend:
 
     `open(configuration, settings, realtime)` returns the rig, stopped; the caller closes it. If it raises InvalidInput
     or RigError, it leaves nothing open. `settings` is the class of its table in the configuration, `extras` the
-    optional dependencies of this program required for such settings. `real_time_only`: the backend has no virtual time.
-    `operator`: a person performs the tasks between two tests.
+    optional dependencies of this program required for such settings. `real_time_only` states that the backend has no
+    virtual time, `operator` that a person performs the tasks between two tests.
     """
 
     open: "Callable[[CommonSettings, Any, bool], Rig]"

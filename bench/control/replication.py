@@ -136,7 +136,7 @@ class Replication:
 
     @property
     def repeatable(self) -> float:
-        """Relative root mean square error of the best drive, excluding noise; 1 before any pass."""
+        """Relative root mean square error of the best drive, excluding noise; 1 before the first pass."""
         power = self._size(np.abs(self._missing) ** 2) ** 2 - self._size(self._noise) ** 2 / self._plays
         return max(power, 0.0) ** 0.5 / self._norm
 

@@ -77,8 +77,8 @@ class Guard:
         self._held: float | None = None
         self._sending = False
         self._owed = self._zeros = 0
-        """Samples that may be queued in the rig in addition to those in `_waiting`, and samples read since the ramp
-        ended with only zeros in `_waiting`.
+        """`_owed`: number of samples that may be queued in the rig in addition to those in `_waiting`. `_zeros`: number
+        of samples read since the ramp ended with only zeros in `_waiting`.
         """
         self._make_watches()
         self._ramp_samples: int | None = None

@@ -22,7 +22,7 @@ from sim.errors import InvalidInput
 from sim.map_rows import Continuation
 
 STATE, OWN = "state.npz", "unfinished-map"
-"""Names of the state and of an empty file that marks the folder as one that may be removed."""
+"""Names of the state file, and of an empty file that marks the folder as one that may be removed."""
 
 TEXT = "<U16"
 """Type of columns that contain strings."""

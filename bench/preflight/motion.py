@@ -79,7 +79,9 @@ def resting_demands(
 
 
 def _storeys(specimen: Specimen, omega: Array) -> NDArray[np.complex128]:
-    """u1 and u2 [m] per table acceleration [m/s2] at `omega` [rad/s], shape (2, n); for a block, while it rests."""
+    """u1 and u2 [m] per table acceleration [m/s2] at `omega` [rad/s], shape (2, n); with a block, they apply while it
+    rests.
+    """
     mass, damping, stiffness = frame_matrices(specimen.frame)
     stiffness[0, 0] += specimen.k_c
     w = omega[:, None, None]

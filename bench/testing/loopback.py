@@ -18,7 +18,7 @@ from drivers.computed import ComputedRig
 from drivers.rig import Channel, Counts, OperatorTask, Rig
 
 COUNTS_PER_UNIT = 1000.0
-"""Resolution of every channel: counts per metre or m/s2."""
+"""Resolution of every channel [counts per m or per m/s2]."""
 
 
 class LoopbackRig(ComputedRig):

@@ -36,7 +36,9 @@ class Members:
 
 
 def draw_members(specimen: Specimen, configuration: BenchConfiguration) -> Members:
-    """Draw members reproducibly from the uncertainties of `specimen`, which is the first, and of the accelerometer."""
+    """Draw members reproducibly from the uncertainties of `specimen` and of the accelerometer; the first is
+    `specimen`.
+    """
     twin, random = configuration.twin, np.random.default_rng(configuration.twin.seed)
     others = configuration.known.draws(specimen, twin.members, random)
     scales = 1.0 + configuration.analysis.table_scale * random.standard_normal(twin.members)

@@ -72,8 +72,9 @@ def analyse_tilt(seen: Recording, specimen: Specimen, least: float) -> Tilt:
     mean = float(abs(seen.height * swings.peaks).mean())
     if fit.rms > POOR * mean:
         raise NotRocking(
-            f"the fit of the exact motion leaves an rms residual of {1e3 * fit.rms:.2g} mm out of {1e3 * mean:.3g} mm: "
-            "check that the block rocks on its two edges without yawing or sliding, then repeat the tilt"
+            f"the fit of the exact motion leaves an rms residual of {1e3 * fit.rms:.2g} mm, while the mean peak is "
+            f"{1e3 * mean:.3g} mm: check that the block rocks on its two edges without yawing or sliding, then "
+            "repeat the tilt"
         )
     straight = replace(seen, displacement=fit.straightened(seen.displacement))
     points = find_points(straight, swings, 0.0)

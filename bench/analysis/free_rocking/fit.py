@@ -64,7 +64,7 @@ class RockingFit:
 
     @property
     def motion(self) -> FreeRocking:
-        """The fitted motion, to the side of the recorded tilt."""
+        """The fitted motion, which begins on the side of the recorded tilt."""
         return _motion(self.values, float(np.sign((self.displacement - self.values[ZERO])[0])))
 
     @property
