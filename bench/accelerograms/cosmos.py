@@ -41,7 +41,7 @@ class _Block(NamedTuple):
 
 
 def recognise(text: RecordText) -> bool:
-    """Whether the first line names a COSMOS format."""
+    """Whether the first line states a COSMOS format."""
     return _START.search(text.lines[0]) is not None and any(_REALS.match(line) for line in text.lines)
 
 

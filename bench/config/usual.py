@@ -13,7 +13,7 @@ ANGULAR = "rad/s"
 """The unit of circular frequencies; unusual values are shown in Hz too."""
 
 _SLOW, _FAST = 0.6, 2.5
-"""Multiples of the bare frame's first and second natural frequencies; a frequency outside them is unusual."""
+"""Multiples of the bare frame's first and second natural frequencies between which a frequency is usual."""
 
 
 _SPRING_OFF = 2.0

@@ -105,8 +105,8 @@ def _transformed(values: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Peak:
-    """Peak pseudo-acceleration of an oscillator [m/s2], with sign, and the weight of each sample of the excitation in
-    it.
+    """Peak pseudo-acceleration of an oscillator [m/s2], with sign, and its derivative with respect to each sample of
+    the excitation.
     """
 
     value: float

@@ -116,7 +116,7 @@ TOLERANCE = 1e-7
 """Relative tolerance of the simulations."""
 
 CATCH_ANGLE = 0.35
-"""Tilt [rad] beyond which the block counts as fallen: no spring of the campaign could restore it."""
+"""Tilt [rad] beyond which the block counts as fallen: no spring of the campaign could set it upright again."""
 
 CLOSE = 0.10
 """Relative difference between the peaks of drift and tilt and those of the orbit, below which a motion counts as
