@@ -81,8 +81,8 @@ def members(repetitions: int) -> Section:
 
 
 def _at_equal_error(rows: list[dict[str, Cell]]) -> float | None:
-    """Greatest ratio, over the settings of heyoka, of the time of the engine's fastest setting that is at least as
-    accurate to the time of heyoka.
+    """Time of the engine's fastest setting that is at least as accurate as a setting of heyoka, relative to the time of
+    that setting: the greatest ratio over the settings of heyoka.
     """
     found = {name: [row for row in rows if row["method"] == name and row["status"] == "ok"] for name in (OURS, THEIRS)}
     ratios: list[float] = []

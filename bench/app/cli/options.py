@@ -107,7 +107,7 @@ def with_flags(
 
 
 def _several(values: list[object]) -> str:
-    """Values as typed on the command line; more than eight equally spaced ones as `start:stop:count`."""
+    """Values as typed on the command line; more than eight equally spaced values as `start:stop:count`."""
     numbers = [value for value in values if isinstance(value, float)]
     if len(numbers) == len(values) > 8:
         first, last, steps = numbers[0], numbers[-1], len(numbers) - 1

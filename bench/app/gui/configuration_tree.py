@@ -21,7 +21,9 @@ from sim.parameters import Parameters
 
 
 class ConfigurationTree(QTreeWidget):
-    """Read-only view of a configuration. Values that differ from their defaults are bold and their groups expanded."""
+    """Read-only view of a configuration. Values that differ from their defaults are bold, and their groups are
+    expanded.
+    """
 
     def __init__(self) -> None:
         super().__init__()

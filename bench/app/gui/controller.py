@@ -200,8 +200,8 @@ class Controller(QObject):
         self._introduce(run, 0.0)
 
     def attach(self, session: RunningSession) -> None:
-        """Attach to a session that another window or a terminal has started, and show its run; this window can stop
-        it.
+        """Attach to a session that another window or a terminal has started, and show its run, which this window can
+        stop.
         """
         if not self._running:
             self.latched = False

@@ -173,7 +173,7 @@ class GainPlot(pg.PlotWidget):
         return self._kind == "spectrum"
 
     def _place(self, gain: float) -> float:
-        """Axis coordinate of a gain, which single items need: pyqtgraph transforms only lines on a logarithmic axis."""
+        """Axis coordinate of a gain for a single item, since pyqtgraph transforms only lines on a logarithmic axis."""
         return log10(gain) if self._log else gain
 
     def _draw_spreads(self) -> None:

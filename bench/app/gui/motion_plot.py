@@ -33,8 +33,8 @@ _T, _U1, _U2 = (TWIN_TRACE.index(name) for name in ("seconds", "u1", "u2"))
 
 
 def spectrum(time: NDArray[np.float64], drift: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Frequencies [Hz] and amplitudes of equally spaced samples of the drift, in their unit, both shape (n,). The line
-    of a sine has the height of the sine's amplitude (Hann window).
+    """Frequencies [Hz] and amplitudes of equally spaced samples of the drift, in their unit, both of shape (n,). The
+    line of a sine has the height of the sine's amplitude (Hann window).
     """
     window = np.hanning(drift.size)
     lines: NDArray[np.float64] = np.abs(np.fft.rfft((drift - drift.mean()) * window)) * 2.0 / window.sum()

@@ -48,7 +48,9 @@ class RunningSession:
 
 
 def sessions_folder() -> Path | None:
-    """Folder of the announcements, created if missing; None if switched off, or if others could write to it."""
+    """Folder of the announcements, created if missing; None if announcements are disabled, or if other users could
+    write to the folder.
+    """
     given = os.environ.get(FOLDER)
     if given == "off":
         return None
