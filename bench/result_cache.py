@@ -25,7 +25,7 @@ SWITCH = "ROCKBENCH_RESULT_CACHE"
 
 FOLDER = "results"
 MOST = 4000
-"""Largest number of entries; the least recently used ones are removed."""
+"""Maximum number of entries; beyond it, the least recently used ones are removed."""
 
 PACKAGES = ("bench", "drivers", "protocols", "sim")
 

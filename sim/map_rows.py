@@ -96,7 +96,8 @@ def rows_of_orbits(
 @dataclass(frozen=True, eq=False)
 class _Strip:
     """Columns that are continued together, from known rows of the first specimens: `sections`, shape (k, m, 6), and
-    `jacobians`, (k, m, 6, 6). Those with `peaks`, shape (j, m, 3), the last ones, belong to the block.
+    `jacobians`, shape (k, m, 6, 6). The last j rows belong to the block of rows that is computed; `peaks`, shape
+    (j, m, 3), are theirs.
     """
 
     specimens: list[Specimen]

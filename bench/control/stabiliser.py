@@ -112,7 +112,7 @@ class Stabiliser:
 
 
 def _regulator(found: CycleMap) -> Array:
-    """Feedback gain for the deviation and the last control, shape (2, n + 2), that minimises both."""
+    """Feedback gain on the deviation and the last control, shape (2, n + 2), from the discrete Riccati equation."""
     from scipy.linalg import solve_discrete_are
 
     (b1, b0), n = found.inputs, found.transition.shape[0]

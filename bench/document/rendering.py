@@ -50,7 +50,7 @@ def html_page(document: Document) -> str:
 
 
 def write_pdf(path: Path, document: Document) -> None:
-    """Writes the pages to `path`, replacing any file. Draws every figure and keeps its size."""
+    """Write the pages to `path`, replacing any existing file. Every figure is drawn at its own size."""
     import matplotlib
     import typst
 

@@ -278,8 +278,8 @@ conversion of a decimal number.
 """
 
 NEAR_TIE = 1e-3
-"""Distance of the discarded digits from one half, in units of the last digit, below which a value is rounded by
-conversion to text.
+"""A value whose discarded digits are closer to one half than this, in units of the last digit, is rounded by conversion
+to text.
 """
 
 

@@ -122,8 +122,8 @@ class DaqSession:
     def write(self, volts: NDArray[np.float64]) -> None:
         """Append drive samples, shape (n,), finite and in range [V]; those written before `start` are played first.
 
-        Raises DriveUnderflow if the output has run out of samples, DeviceTimeout if no space becomes free, RigError
-        when the session is not prepared.
+        Raises DriveUnderflow if the output has run out of samples, DeviceTimeout if no space becomes free, and RigError
+        if the session is not prepared.
         """
         with self._lock:
             if self._state is not _State.RUNNING:

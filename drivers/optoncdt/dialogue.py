@@ -87,7 +87,7 @@ class CommandRefused(RigError):
         if answer.startswith("E202"):
             remedy = "switch it to the professional user level in its web interface"
         else:
-            remedy = "check the command in the manual of its firmware"
+            remedy = "check the command in the manual of the sensor's firmware"
         super().__init__(f"{who} refused {command}: {answer}; {remedy}")
         self.answer = answer
 

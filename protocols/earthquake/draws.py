@@ -1,4 +1,4 @@
-"""Gains of drawn specimens under drawn motions of the table, within their uncertainties.
+"""Gains of specimens and table motions that are drawn at random within their uncertainties.
 
 The bare frame is linear. If a draw differs from the known frame and the measured motion only by the scale of the
 motion, its peaks are those of a single run, multiplied by the scale.

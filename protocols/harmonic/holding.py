@@ -236,7 +236,7 @@ class _Hold:
         return None
 
     def measured(self) -> Held | None:
-        """The held motion, once the table's motion is a sine and enough cycles are steady."""
+        """The held motion; None until the table's motion is a sine and enough cycles are steady."""
         if len(self._used) < self._wanted:
             return None
         if not self._detector.judge(allowance=2.0).steady:

@@ -67,7 +67,7 @@ class Plant(NamedTuple):
     lag: float
 
 
-# `Any`: a string cannot name the type of the constants, so that the signatures here are objects of numba
+# `Any`: the type of PLANT cannot be written as a string, so the signatures here are objects of numba
 FLOAT: Any = types.float64
 INT: Any = types.int64
 VOID: Any = types.void

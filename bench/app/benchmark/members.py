@@ -18,7 +18,7 @@ COLUMNS = (
     Column("method", "method"),
     Column("setting", "setting"),
     Column("status", "status"),
-    Column("error", "error of end state", ".1e"),
+    Column("error", "end-state error", ".1e"),
     Column("min_ms", "min [ms] per trajectory", ".2f"),
     Column("per_second", "trajectories per second and core", ".0f"),
 )

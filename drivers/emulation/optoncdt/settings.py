@@ -9,7 +9,7 @@ BAUDS = (9600, 19200, 56000, 115200, 128000, 230400, 256000, 460800, 691200, 921
 ADDITIONAL = ("SHUTTER", "COUNTER", "TIMESTAMP", "INTENSITY", "STATE", "DIST_RAW")
 """Values that can be sent with the distance.
 
-Their order of transmission is not documented; this sensor sends them in this order, whatever the order of the request.
+The manual does not document the order of transmission. This sensor uses the order of this list, whatever the request.
 """
 
 
