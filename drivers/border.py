@@ -38,7 +38,7 @@ class CheckedClock:
         try:
             given: object = self._clock.now()
         except Exception as error:
-            self.fault = f"its clock cannot be read ({_told(error)})"
+            self.fault = f"its clock cannot be read ({_error_text(error)})"
             return self._last
         if is_number(given):
             self._last = float(given)
@@ -275,12 +275,12 @@ class _Calls:
 
     def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
         if isinstance(error, Exception) and not isinstance(error, RockbenchError | MemoryError):
-            raise BackendFault(self._backend, f"failed in {self._call} ({_told(error)})") from error
+            raise BackendFault(self._backend, f"failed in {self._call} ({_error_text(error)})") from error
 
 
 _CALLS = ("interlocks", "arm", "write", "read", "stop", "halt", "close", "perform")
 
 
-def _told(error: BaseException) -> str:
-    said = " ".join(str(error).split())
-    return f"{type(error).__name__}: {said}" if said else type(error).__name__
+def _error_text(error: BaseException) -> str:
+    text = " ".join(str(error).split())
+    return f"{type(error).__name__}: {text}" if text else type(error).__name__

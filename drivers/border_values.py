@@ -84,10 +84,10 @@ def wrong_with(channel: Any) -> str:
     higher: Any = channel.higher
     if type(higher) is not tuple or not all(map(is_number, cast("tuple[Any, ...]", higher))):
         return f"the higher terms of {channel.name} are {higher!a}"
-    return _wrong_with_counts(channel)
+    return _counts_fault(channel)
 
 
-def _wrong_with_counts(channel: Channel) -> str:
+def _counts_fault(channel: Channel) -> str:
     valid, faults, span = cast(Any, channel.valid), cast(Any, channel.faults), np.iinfo(np.int32)
     if (
         type(valid) is not tuple

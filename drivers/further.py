@@ -48,13 +48,13 @@ class FurtherChannel(CalibratedInput):
     )
 
     @model_validator(mode="after")
-    def _a_name_of_its_own(self) -> "FurtherChannel":
+    def _check_name(self) -> "FurtherChannel":
         if self.name in TAKEN:
             raise InvalidInput("name", self.name, "this name is reserved; choose a different one")
         return self
 
     @model_validator(mode="after")
-    def _a_limit_that_can_be_measured(self) -> "FurtherChannel":
+    def _check_limit(self) -> "FurtherChannel":
         reach = (self.range - abs(self.zero)) / abs(self.sensitivity)
         if self.limit is not None and self.limit > reach:
             scale = f"range = {self.range:g} V and sensitivity = {self.sensitivity:g}"

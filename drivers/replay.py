@@ -101,7 +101,7 @@ class ReplayRig(RigBase):
         self._recording = recording
         self._course = course
         self._number = -1
-        self._over: str | None = None
+        self._overrun: str | None = None
         self._rest: list[tuple[int, int]] = []
         self._started = 0.0
 
@@ -110,9 +110,9 @@ class ReplayRig(RigBase):
         return () if self._course is None or self._number < 0 else self._course.alignments(self._number)
 
     @property
-    def over(self) -> str | None:
+    def overrun(self) -> str | None:
         """Description of a request beyond the end of the recording; None if there was none."""
-        return self._over
+        return self._overrun
 
     def interlocks(self) -> Mapping[str, bool]:
         if self._course is None or not self.armed:
@@ -123,8 +123,8 @@ class ReplayRig(RigBase):
         self.require_stopped("arm", REARM)
         runs = self._recording.runs
         if self._number + 1 >= len(runs):
-            self._over = f"all {len(runs)} recorded runs have been replayed"
-            raise RigError(f"arm is refused: {self._over}; reopen the recording")
+            self._overrun = f"all {len(runs)} recorded runs have been replayed"
+            raise RigError(f"arm is refused: {self._overrun}; reopen the recording")
         self._number += 1
         self._rest = list(runs[self._number].stretches)
         self._drive.begin()
@@ -142,15 +142,15 @@ class ReplayRig(RigBase):
         with ending_by(self.stop):
             self._drive.require(n)
             if not self._rest:
-                self._over = f"the recording of this run ends at sample {self._drive.index}"
-                raise RigError(f"{self._over}; stop, and arm for the next run")
+                self._overrun = f"the recording of this run ends at sample {self._drive.index}"
+                raise RigError(f"{self._overrun}; stop, and arm for the next run")
         first, length = self._rest.pop(0)
         taken = min(n, length)
         if taken < length:
             self._rest.insert(0, (first + taken, length - taken))
         self._drive.advance(taken, gap=first - self._drive.index)
         if taken < n and not self._rest:
-            self._over = f"the recording of this run ends within a block, at sample {self._drive.index}"
+            self._overrun = f"the recording of this run ends within a block, at sample {self._drive.index}"
         counts = self._recording.runs[self._number].counts(first, taken)
         end = self._drive.index
         due = self._started + end / self.sample_rate

@@ -91,7 +91,7 @@ class Finding(Parameters):
         return _canonical(name)
 
     @model_validator(mode="after")
-    def _within_the_limits_of_the_quantity(self) -> "Finding":
+    def _check_value(self) -> "Finding":
         if self.value == 0.0 and self.name not in _MAY_VANISH:
             raise InvalidInput("value", self.value, f"{self.name} must be above 0")
         highest = _HIGHEST.get(self.name, np.inf)
@@ -109,7 +109,7 @@ class Correlation(Parameters):
 
     @field_validator("first", "second")
     @classmethod
-    def _as_findings_are_named(cls, name: str) -> str:
+    def _canonical_name(cls, name: str) -> str:
         return _canonical(name)
 
     @property
@@ -125,7 +125,7 @@ class Identified(Parameters):
     correlations: tuple[Correlation, ...] = quantity((), "", "correlations between findings")
 
     @model_validator(mode="after")
-    def _that_can_be(self) -> "Identified":
+    def _check_findings(self) -> "Identified":
         names = self.names
         for index, name in enumerate(names):
             if name in names[:index]:

@@ -162,7 +162,7 @@ def _first_row(specimen: Specimen, omegas: Floats, amplitude: float) -> Solution
     try:
         branch = branch_solutions(specimen, places, amplitude)
     except NoOrbit:
-        branch = {omega: solution for omega in places if (solution := _alone(specimen, omega, amplitude))}
+        branch = {omega: solution for omega in places if (solution := _single_solution(specimen, omega, amplitude))}
     n = len(places)
     row = Solutions(np.full((n, 6), np.nan), np.full((n, 6, 6), np.nan), np.full((n, 3), np.nan), np.zeros(n, np.bool_))
     for i, omega in enumerate(places):
@@ -171,7 +171,7 @@ def _first_row(specimen: Specimen, omegas: Floats, amplitude: float) -> Solution
     return row
 
 
-def _alone(specimen: Specimen, omega: float, amplitude: float) -> Solution | None:
+def _single_solution(specimen: Specimen, omega: float, amplitude: float) -> Solution | None:
     try:
         return branch_solutions(specimen, [omega], amplitude)[omega]
     except NoOrbit:

@@ -124,7 +124,7 @@ def reached(
     more = SineProgram([Sweep.dwell(window, amplitude, omega)], phase % tau)
     motion = simulate(specimen, program, peaks_from=program.duration - window)
     time, rounds = motion.end_time, 0
-    while (outcome := _judged(motion, steady)) is Outcome.OTHER and rounds < _patience(steady):
+    while (outcome := _judged(motion, steady)) is Outcome.OTHER and rounds < _most_rounds(steady):
         motion = simulate(specimen, more, state=motion.end)
         time, rounds = time + motion.end_time, rounds + 1
     return Reached(outcome, time, motion.overturned, motion.peaks if motion.status is Status.COMPLETED else None)
@@ -189,7 +189,7 @@ def _steady(specimen: Specimen, omega: float, amplitude: float) -> Steady:
     return Steady(rocking.peaks, resting.peaks if resting else None, rocking.multiplier)
 
 
-def _patience(steady: Steady) -> int:
+def _most_rounds(steady: Steady) -> int:
     """Number of rounds, of WINDOW periods each, for which an undecided motion is continued."""
     if steady.rocking is None:
         return FEWEST_ROUNDS
@@ -202,13 +202,13 @@ def _judged(motion: Motion, steady: Steady) -> Outcome:
     if motion.status is not Status.COMPLETED:
         return Outcome.FAILED
     if motion.end.mode is Mode.REST and motion.peaks.theta == 0.0:
-        if steady.resting is not None and _near(motion.peaks, steady.resting):
+        if steady.resting is not None and _is_near(motion.peaks, steady.resting):
             return Outcome.RESTING
-    elif steady.rocking is not None and _near(motion.peaks, steady.rocking):
+    elif steady.rocking is not None and _is_near(motion.peaks, steady.rocking):
         return Outcome.ROCKING
     return Outcome.OTHER
 
 
-def _near(peaks: Peaks, orbit: Peaks) -> bool:
+def _is_near(peaks: Peaks, orbit: Peaks) -> bool:
     pairs = ((peaks.u1, orbit.u1), (peaks.drift, orbit.drift), (peaks.theta, orbit.theta))
     return all(abs(peak - steady) <= WITHIN * steady for peak, steady in pairs)

@@ -34,7 +34,7 @@ class Frame(Parameters):
     xi2: float = quantity(0.035, "1", "damping ratio of the second mode of the bare frame", ge=0, lt=1, usual=DAMPING)
 
     @model_validator(mode="after")
-    def _a_frame_that_can_stand(self) -> "Frame":
+    def _check_frame(self) -> "Frame":
         if self.h1 >= self.h2:
             raise InvalidInput(
                 "h1", self.h1, f"it must be less than h2 = {self.h2:g} m, the height of the second storey"
@@ -86,7 +86,7 @@ class Block(Parameters):
     )
 
     @model_validator(mode="after")
-    def _an_impact_gives_no_energy(self) -> "Block":
+    def _check_restitution(self) -> "Block":
         # if r is below 0, as for a slab 1.42 times as wide as high, the impact would return it to the previous corner
         if not 0.0 <= self.restitution <= 1.0:
             allowed = (
@@ -165,7 +165,7 @@ class Specimen(Parameters):
     g: float = quantity(9.81, "m/s2", "acceleration of gravity", gt=0, usual=(9.76, 9.84))
 
     @model_validator(mode="after")
-    def _springs_can_be_told_apart(self) -> "Specimen":
+    def _check_labels(self) -> "Specimen":
         labels = [spring.label for spring in self.springs]
         if len(set(labels)) < len(labels):
             raise InvalidInput("springs", labels, "each label may occur once")

@@ -43,7 +43,7 @@ class VirtualBenchParameters(Parameters):
     converter: Converter = Converter()
 
     @model_validator(mode="after")
-    def _filter_below_half_the_sample_rate(self) -> "VirtualBenchParameters":
+    def _check_cutoff(self) -> "VirtualBenchParameters":
         rate = self.sample_rate
         if self.filter_unit.cutoff >= 0.5 * rate:
             allowed = f"it must be below sample_rate / 2 = {rate / 2:g} Hz, sample_rate = {rate:g} 1/s"
@@ -51,7 +51,7 @@ class VirtualBenchParameters(Parameters):
         return self
 
     @model_validator(mode="after")
-    def _lasers_stand_together(self) -> "VirtualBenchParameters":
+    def _check_references(self) -> "VirtualBenchParameters":
         if self.laser_1.reference != self.laser_2.reference:
             allowed = (
                 f"the drift needs both lasers on one reference, but laser_1.reference = {self.laser_1.reference!r}"
@@ -163,9 +163,9 @@ class VirtualBench:
     @property
     def sights(self) -> Array:
         """True motion of the lasers' targets in the last `run` or `coast`, shape (4, n): `sim.arrangement.sights`."""
-        return self._seen(np.ascontiguousarray(self._samples.T))
+        return self._laser_displacements(np.ascontiguousarray(self._samples.T))
 
-    def _seen(self, states: Array) -> Array:
+    def _laser_displacements(self, states: Array) -> Array:
         # both lasers have the same reference, as the parameters require
         return sights(states, self._arrangement, self.parameters.laser_1.reference == "ground")
 
@@ -258,7 +258,7 @@ class VirtualBench:
         volts = np.empty((4 + len(self._further), s.shape[1]))
         volts[0] = p.displacement_sensor.volts(s[0], p.sample_rate, self._displacement_random)
         volts[1] = p.accelerometer.volts(s[8], p.sample_rate, self._accelerometer_random)
-        seen = self._seen(s)
+        seen = self._laser_displacements(s)
         volts[2] = self._laser_1.read(seen[0], seen[1])
         volts[3] = self._laser_2.read(seen[2], seen[3])
         if self._further:

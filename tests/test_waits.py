@@ -54,7 +54,7 @@ LISTED = {
     "bench/app/ipc/client.py self._outgoing.get": THREAD,
     "bench/app/ipc/process.py connection.recv": NOT_LONG,
     "bench/app/ipc/process.py sys.stdin.readline": "the client has written the line before the process starts",
-    "bench/app/ipc/server.py self.outbox.join": NOT_LONG,
+    "bench/app/ipc/server.py self.broadcast.join": NOT_LONG,
     "bench/app/ipc/server.py self._host.answers.get": SHORT,
     "bench/app/ipc/server.py self._notes.get": NOT_LONG,
     "bench/app/ipc/sessions.py lock.acquire": NOT_LONG,

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from bench.accelerograms.accelerogram import Accelerogram
 from bench.accelerograms.units import STANDARD_GRAVITY
-from bench.analysis.table_motion import at_rest_in_the_end
+from bench.analysis.table_motion import with_final_rest
 from sim.errors import InvalidInput
 
 Array = NDArray[np.float64]
@@ -176,13 +176,13 @@ def _motion(shape: Shape, seed: int, member: int) -> Array:
 
     rate = SIGNIFICANT / shape.significant
     n = ceil((DECAYED / rate + FADING / shape.ground[2]) / DT) + 1
-    noise = at_rest_in_the_end(shot_noise(seed, member, n, DT, shape.significant, shape.ground), DT)
+    noise = with_final_rest(shot_noise(seed, member, n, DT, shape.significant, shape.ground), DT)
     noise /= np.abs(noise).max()
     peak = shape.peak * STANDARD_GRAVITY
     if shape.pulse is None:
         return peak * noise
     time = np.asarray(np.arange(n) * DT - 1.0 / rate, dtype=np.float64)
-    pulse = at_rest_in_the_end(pulse_acceleration(shape.pulse, time), DT)
+    pulse = with_final_rest(pulse_acceleration(shape.pulse, time), DT)
 
     def excess(level: float) -> float:
         return float(np.abs(pulse + level * noise).max()) - peak

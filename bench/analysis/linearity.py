@@ -80,10 +80,10 @@ class Harmonics:
         """
         swing = max(0.5 * float(np.ptp(self.readings)), step, np.finfo(np.float64).tiny)
         rounding = min(sqrt(ZETA_3 * step**3 / (pi**4 * swing)), step / sqrt(12.0))
-        return self.widened(rounding)
+        return self.with_uncertainty(rounding)
 
     @lru_cache(maxsize=64)  # noqa: B019 - as above
-    def widened(self, uncertainty: float) -> "Harmonics":
+    def with_uncertainty(self, uncertainty: float) -> "Harmonics":
         """The harmonics with an additional standard `uncertainty` [m] of each part. Returns the same object for the
         same uncertainty.
         """
@@ -166,7 +166,7 @@ def linearity_errors(
     if not checks:
         worst = int(np.einsum("i,kij,j->k", shares, prior, shares).argmax())
         return LinearityErrors(prior[worst], float(waves[worst]))
-    learned = _learned(tuple(checks), limit, whole)
+    learned = _posterior(tuple(checks), limit, whole)
     crossed = 0.5 * limit**2 * _covariances(learned.places, learned.observed, places, weights, whole)
     white = learned.whitening @ crossed
     mean = np.einsum("kmi,km->ki", white, learned.measured)
@@ -176,7 +176,7 @@ def linearity_errors(
 
 
 @dataclass(frozen=True, eq=False)
-class _Learned:
+class _Posterior:
     """Information from m measured harmonics about the curve, for each of K curves with different numbers of waves.
     `whitening`, shape (K, m, m), transforms the harmonics to independent numbers of unit variance; `measured`, shape
     (K, m), are the transformed harmonics; `likely`, shape (K,), is the weight of each curve. `observed`, shape (m, n),
@@ -191,7 +191,7 @@ class _Learned:
 
 
 @lru_cache(maxsize=32)
-def _learned(checks: tuple[Harmonics, ...], limit: float, whole: float) -> _Learned:
+def _posterior(checks: tuple[Harmonics, ...], limit: float, whole: float) -> _Posterior:
     places = np.concatenate([each.readings for each in checks])
     observed = _rows([_fourier(each.readings.size, each.found.size) for each in checks])
     measured = np.concatenate([np.concatenate((each.found.real, each.found.imag)) for each in checks])
@@ -202,7 +202,7 @@ def _learned(checks: tuple[Harmonics, ...], limit: float, whole: float) -> _Lear
     sizes = np.log(np.diagonal(factors, axis1=1, axis2=2)).sum(axis=1)
     evidence = -0.5 * np.einsum("km,km->k", white, white) - sizes
     likely = np.exp(CAUTION * (evidence - evidence.max()))
-    return _Learned(places, observed, whitening, white, likely / likely.sum())
+    return _Posterior(places, observed, whitening, white, likely / likely.sum())
 
 
 def _covariances(one: Array, left: Array, other: Array, right: Array, whole: float) -> Array:

@@ -48,7 +48,7 @@ def remaining_transient(series: Array, measured: int) -> float:
     varying = series - series.mean()
     coarse = _coarse(n, measured).fitted(varying)
     decay, angle = divmod(int(coarse[0].argmin()), len(ANGLES))
-    fine = _fine(n, measured, decay, angle).fitted(varying)
+    fine = _fine_fit(n, measured, decay, angle).fitted(varying)
     squares, shifts, gains = (np.concatenate(each) for each in zip(coarse, fine, strict=True))
     least = float(squares.min())
     scatter = least / max(n - 5, 1)
@@ -96,7 +96,7 @@ def _coarse(n: int, measured: int) -> _Fit:
 
 
 @lru_cache(maxsize=64)
-def _fine(n: int, measured: int, decay: int, angle: int) -> _Fit:
+def _fine_fit(n: int, measured: int, decay: int, angle: int) -> _Fit:
     """The fit of modes around an element of the grid."""
     return _Fit.of(_around(DECAYS, decay), _around(ANGLES, angle), n, measured)
 

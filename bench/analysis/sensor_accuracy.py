@@ -204,7 +204,7 @@ class SensorUncertainty:
         # the harmonics that remain in the corrected readings of the bare frame check the reference sensor
         curves, step = self.calibration.lasers, self.accuracy.laser_resolution
         checks = [
-            each.rounded(step).widened(curve.uncertainty)
+            each.rounded(step).with_uncertainty(curve.uncertainty)
             for test in self.checks
             for each, curve in zip(test, curves, strict=True)
         ]

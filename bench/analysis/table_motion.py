@@ -37,7 +37,7 @@ def table_motion(acceleration: Array, dt: float) -> TableMotion:
     return TableMotion(velocity, displacement)
 
 
-def at_rest_in_the_end(acceleration: Array, dt: float) -> Array:
+def with_final_rest(acceleration: Array, dt: float) -> Array:
     """`acceleration` minus the two lowest sines over its duration, so that the table ends at rest where it began.
 
     The final velocity and displacement are linear in the two amplitudes, so this is exact except for rounding; the

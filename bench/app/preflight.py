@@ -157,7 +157,7 @@ class Preflight:
         kept: dict[str, Table] = {}
         if self.margins:
             kept["preflight"] = margins_table(self.margins)
-        if any(stage.legs for stage in self.forecast.stages):
+        if any(stage.segments for stage in self.forecast.stages):
             kept["planned_drive"] = drive_table(self.forecast.stages)
         return kept
 

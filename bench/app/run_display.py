@@ -173,7 +173,7 @@ class RunDisplay:
     preparing: bool = False
     """Whether the session is computing before the rig is opened or after it is closed."""
     _begun: float = 0.0
-    _told: float = 0.0
+    _estimated_at: float = 0.0
 
     def prepare(self, phase: str, done: int, total: int) -> None:
         """Show a stage before the rig is opened or after it is closed."""
@@ -182,19 +182,19 @@ class RunDisplay:
             self.reason, self._begun = one_line(phase), now
         self.fraction = done / total if total else 0.0
         self.remaining = (now - self._begun) * (total - done) / done if done else float("nan")
-        self._told, self.preparing = self.time, True
+        self._estimated_at, self.preparing = self.time, True
 
     def expect(self, duration: float | None) -> None:
         """Show the `duration` of the plan [s], None if unknown; called once the rig is open. The run's own reports of
         progress replace it.
         """
         self.fraction, self.remaining, self.preparing = 0.0, nan if duration is None else duration, False
-        self.reason, self._told = "", self.time
+        self.reason, self._estimated_at = "", self.time
 
     @property
     def time_left(self) -> float:
         """Remaining time [s], less the bench time elapsed since it was estimated; NaN if unknown."""
-        return max(self.remaining - max(self.time - self._told, 0.0), 0.0) if isfinite(self.remaining) else nan
+        return max(self.remaining - max(self.time - self._estimated_at, 0.0), 0.0) if isfinite(self.remaining) else nan
 
     def update(self, event: Event) -> Notice | None:
         """Update the state with an event other than a block of samples; returns the event's log line, if any."""
@@ -217,7 +217,7 @@ class RunDisplay:
                 self.fraction = min(max(event.fraction, 0.0), 1.0)
                 self.activity = one_line(event.activity)
                 if isfinite(event.remaining):
-                    self.remaining, self._told = event.remaining, self.time
+                    self.remaining, self._estimated_at = event.remaining, self.time
             case Estimate():
                 self.running = Row.running(event)
             case RunningGain():

@@ -217,7 +217,7 @@ class BenchConfiguration(Parameters):
 
     @field_validator("rig", mode="plain")
     @classmethod
-    def _settings_of_the_backend(cls, given: Any, info: ValidationInfo) -> RigSettings | None:
+    def _backend_settings(cls, given: Any, info: ValidationInfo) -> RigSettings | None:
         name = info.data.get("backend")
         if name is None:
             return None
@@ -237,7 +237,7 @@ class BenchConfiguration(Parameters):
         return validated(settings, cast(dict[str, Any], given or {}))
 
     @model_validator(mode="after")
-    def _springs_belong_to_the_protocol(self) -> "BenchConfiguration":
+    def _check_spring(self) -> "BenchConfiguration":
         for name, specimen in (("specimen", self.specimen), ("simulation.specimen", self.simulation.specimen)):
             if specimen is not None and specimen.beta is not None:
                 allowed = "the protocol selects the springs; remove it (see simulation.spring_factor)"
@@ -245,14 +245,14 @@ class BenchConfiguration(Parameters):
         return self
 
     @model_validator(mode="after")
-    def _a_file_or_its_content(self) -> "BenchConfiguration":
+    def _check_files(self) -> "BenchConfiguration":
         for file, content in (("specimen_file", "identified"), ("laser_calibration", "calibrated")):
             if None not in (path := getattr(self, file), getattr(self, content)):
                 raise InvalidInput(file, path, f"{content} is also present; remove one of them")
         return self
 
     @model_validator(mode="after")
-    def _what_is_identified_can_be(self) -> "BenchConfiguration":
+    def _check_identified(self) -> "BenchConfiguration":
         try:
             _ = self.known_specimen
         except InvalidInput as refusal:
@@ -260,7 +260,7 @@ class BenchConfiguration(Parameters):
         return self
 
     @model_validator(mode="after")
-    def _channels_of_their_own(self) -> "BenchConfiguration":
+    def _check_channels_unique(self) -> "BenchConfiguration":
         hardware = self.hardware
         terminals = {each.terminal.lower(): name for name, each in (*hardware.transducers, *hardware.analogue_lasers)}
         names = set[str]()
@@ -282,7 +282,7 @@ class BenchConfiguration(Parameters):
         return self
 
     @model_validator(mode="after")
-    def _blocks_suit_the_devices(self) -> "BenchConfiguration":
+    def _check_block_duration(self) -> "BenchConfiguration":
         block, watchdog = self.acquisition.block_duration, self.hardware.daq.watchdog
         if self.backend != "hardware":
             return self

@@ -200,12 +200,12 @@ def _refusal(model: type[Parameters], detail: Any, named: Callable[[Path], str])
         if remedy := _remedy(entry, value, listed):
             return InvalidInput(named(path), value, remedy)
     allowed = (
-        f"it must be {entry.allowed_in_unit}{_as_meant(entry, value)}" if entry is not None else str(detail["msg"])
+        f"it must be {entry.allowed_in_unit}{_unit_hint(entry, value)}" if entry is not None else str(detail["msg"])
     )
     return InvalidInput(named(path), value, allowed)
 
 
-def _as_meant(entry: Declared, value: Any) -> str:
+def _unit_hint(entry: Declared, value: Any) -> str:
     """Hint for a number above its limit that may be a percentage or an angle in degrees."""
     if not isinstance(value, float | int) or entry.kind is not float or not 1.0 < value <= 360.0:
         return ""

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.analysis.table_motion import Array, TableMotion, at_rest_in_the_end, table_motion
+from bench.analysis.table_motion import Array, TableMotion, table_motion, with_final_rest
 from bench.control.target import Reach
 from sim.errors import InvalidInput
 
@@ -236,7 +236,7 @@ class _Problem:
             except Infeasible:
                 raise self._refusal(f"no change {self._kind} keeps the record") from None
             sizes = np.asarray(solve_triangular(root.T, y, lower=False), dtype=np.float64)
-            fitted = at_rest_in_the_end(self._record - self._modes.sum(sizes), self._dt)
+            fitted = with_final_rest(self._record - self._modes.sum(sizes), self._dt)
             motion = table_motion(fitted, self._dt)
             if self._reach.holds(motion):
                 return fitted

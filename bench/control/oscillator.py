@@ -53,7 +53,7 @@ class DriveCalibration:
 
 
 @dataclass(frozen=True)
-class Leg:
+class Segment:
     """Segment of a program that reaches the table acceleration `amplitude` [m/s2] at `omega` [rad/s] after `duration`
     [s].
     """
@@ -63,21 +63,21 @@ class Leg:
     omega: float
 
 
-def sweeps(legs: Sequence[Leg], amplitude: float, omega: float) -> list[Sweep]:
+def sweeps(segments: Sequence[Segment], amplitude: float, omega: float) -> list[Sweep]:
     """The segments as sweeps, starting from `amplitude` and `omega`; from zero drive, a segment begins at its own
     frequency.
     """
     found: list[Sweep] = []
-    for leg in legs:
-        begin = omega if amplitude > 0.0 else leg.omega
-        found.append(Sweep(leg.duration, (amplitude, leg.amplitude), (begin, leg.omega)))
-        amplitude, omega = leg.amplitude, leg.omega
+    for segment in segments:
+        begin = omega if amplitude > 0.0 else segment.omega
+        found.append(Sweep(segment.duration, (amplitude, segment.amplitude), (begin, segment.omega)))
+        amplitude, omega = segment.amplitude, segment.omega
     return found
 
 
-def program(legs: Sequence[Leg], phase: float = 0.0) -> SineProgram:
+def program(segments: Sequence[Segment], phase: float = 0.0) -> SineProgram:
     """The base motion of the segments, starting from rest."""
-    return SineProgram(sweeps(legs, 0.0, legs[0].omega), phase)
+    return SineProgram(sweeps(segments, 0.0, segments[0].omega), phase)
 
 
 Array = NDArray[np.float64]

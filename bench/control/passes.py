@@ -46,7 +46,7 @@ class Verdict:
 
     share: float
     binds: str | None
-    wanted: float
+    demand: float
     allowed: float
 
     def __str__(self) -> str:
@@ -54,7 +54,7 @@ class Verdict:
             return "within every limit"
         unit = UNITS[self.binds]
         return (
-            f"{self.binds} of {self.wanted:.4g} {unit} exceeds its limit of {self.allowed:.4g} {unit}; "
+            f"{self.binds} of {self.demand:.4g} {unit} exceeds its limit of {self.allowed:.4g} {unit}; "
             f"{self.share:.1%} of it is possible"
         )
 
@@ -127,11 +127,11 @@ class SpectrumCheck:
         """The spectra are compared over the `band` of periods [s] and at single `periods` [s]."""
         self._dt = 1.0 / sample_rate
         self._periods = np.concatenate((logarithmic_periods(*band), np.array(periods)))
-        self._wanted = self._spectrum(target)
+        self._target_spectrum = self._spectrum(target)
 
     def error(self, achieved: Array) -> float:
         """Largest relative deviation of the response spectrum."""
-        return float(np.abs(self._spectrum(achieved) / self._wanted - 1.0).max())
+        return float(np.abs(self._spectrum(achieved) / self._target_spectrum - 1.0).max())
 
     def clear_error(self, achieved: Array, frequency: Array, noise: Array) -> tuple[float, float]:
         """Largest relative deviation not explained by noise, and its period [s]; both zero if there is none.
@@ -143,8 +143,8 @@ class SpectrumCheck:
         natural = 1.0 / self._periods[:, None]
         answer = natural**2 / np.abs(natural**2 - frequency**2 + 2j * DAMPING * natural * frequency)
         noisy = np.sqrt(2.0 * (answer**2 @ noise)) / achieved.size
-        off = np.abs(self._spectrum(achieved) - self._wanted)
-        deviation = np.where(off > CLEAR * noisy, off, 0.0) / self._wanted
+        off = np.abs(self._spectrum(achieved) - self._target_spectrum)
+        deviation = np.where(off > CLEAR * noisy, off, 0.0) / self._target_spectrum
         worst = int(deviation.argmax())
         return float(deviation[worst]), float(self._periods[worst])
 

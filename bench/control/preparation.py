@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bench.analysis.table_motion import Array, TableMotion, at_rest_in_the_end, table_motion
+from bench.analysis.table_motion import Array, TableMotion, table_motion, with_final_rest
 from bench.control.stroke_fit import NOT_BOTH, PERIODS, Method, StrokeFit, fit_stroke
 from bench.control.target import ORDER, REST, Reach, Target, band_gain, check_band, windowed
 from sim.errors import InvalidInput
@@ -168,7 +168,7 @@ def prepare(
 class _Trimmed(NamedTuple):
     record: SampledRecord
     begin: float
-    said: str
+    text: str
 
 
 def _trimmed(record: SampledRecord, share: float) -> _Trimmed:
@@ -207,7 +207,7 @@ def _filtered(record: SampledRecord, band: tuple[float, float]) -> tuple[Sampled
     padded[rest : rest + record.acceleration.size] = record.acceleration
     frequency = np.fft.rfftfreq(padded.size, record.dt).astype(np.float64)
     filtered = np.fft.irfft(band_gain(frequency, band) * np.fft.rfft(padded), padded.size)
-    return SampledRecord(at_rest_in_the_end(filtered, record.dt), record.dt), rest * record.dt
+    return SampledRecord(with_final_rest(filtered, record.dt), record.dt), rest * record.dt
 
 
 def _factor(record: SampledRecord, peak: float) -> float:

@@ -111,7 +111,7 @@ LARGEST_STEP = 0.10
 NOTICED = 1.5
 """Number of standard deviations above which a harmonic is corrected; smaller harmonics are noise."""
 
-TELLING = 5.0
+SIGNIFICANT_STEP = 5.0
 """Size of a step, in standard deviations, above which the secant of the step is used."""
 
 PLAUSIBLE = (0.5, 2.0)
@@ -175,7 +175,7 @@ class SineControl:
             return
         before, n = self._before, self._highest
         step, change = (response.played - before.played)[:n], (response.achieved - before.achieved)[:n]
-        telling = np.abs(step) > TELLING * np.hypot(response.uncertainty, before.uncertainty)[:n]
-        secant = change / np.where(telling, step, 1.0)
+        significant = np.abs(step) > SIGNIFICANT_STEP * np.hypot(response.uncertainty, before.uncertainty)[:n]
+        secant = change / np.where(significant, step, 1.0)
         low, high = PLAUSIBLE
-        self._gains = np.where(telling & (low < np.abs(secant)) & (np.abs(secant) < high), secant, self._gains)
+        self._gains = np.where(significant & (low < np.abs(secant)) & (np.abs(secant) < high), secant, self._gains)

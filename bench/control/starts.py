@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.control.oscillator import Leg, program
+from bench.control.oscillator import Segment, program
 from bench.result_cache import cached
 from sim.ensemble import simulate_many
 from sim.knowledge import SpecimenKnowledge
@@ -53,12 +53,12 @@ class Candidate:
     """A candidate start-up: its sweeps end at the requested amplitude and frequency."""
 
     name: str
-    legs: tuple[Leg, ...]
+    segments: tuple[Segment, ...]
 
     @property
     def duration(self) -> float:
         """Duration [s]."""
-        return sum(leg.duration for leg in self.legs)
+        return sum(segment.duration for segment in self.segments)
 
 
 def candidates(omega: float, amplitude: float) -> list[Candidate]:
@@ -70,8 +70,8 @@ def candidates(omega: float, amplitude: float) -> list[Candidate]:
 
 
 def _direct(omega: float, amplitude: float, ramp: float, overshoot: float) -> Candidate:
-    legs = [Leg(ramp, overshoot * amplitude, omega)]
-    return _eased(f"ramp {ramp:g} s at {omega:g} rad/s", legs, amplitude, overshoot)
+    segments = [Segment(ramp, overshoot * amplitude, omega)]
+    return _candidate(f"ramp {ramp:g} s at {omega:g} rad/s", segments, amplitude, overshoot)
 
 
 def _from_above(
@@ -79,20 +79,20 @@ def _from_above(
 ) -> Candidate:
     rise, wait = ramp
     high = overshoot * amplitude
-    legs = [Leg(rise, high, top)]
+    segments = [Segment(rise, high, top)]
     name = f"ramp {rise:g} s at {top:g} rad/s"
     if wait > 0.0:
-        legs.append(Leg(wait, high, top))
+        segments.append(Segment(wait, high, top))
         name += f", wait {wait:g} s"
-    legs.append(Leg((top - omega) / rate, high, omega))
-    return _eased(f"{name}, chirp {rate:g} rad/s per s", legs, amplitude, overshoot)
+    segments.append(Segment((top - omega) / rate, high, omega))
+    return _candidate(f"{name}, chirp {rate:g} rad/s per s", segments, amplitude, overshoot)
 
 
-def _eased(name: str, legs: list[Leg], amplitude: float, overshoot: float) -> Candidate:
+def _candidate(name: str, segments: list[Segment], amplitude: float, overshoot: float) -> Candidate:
     if overshoot != 1.0:
-        legs = [*legs, Leg(EASE, amplitude, legs[-1].omega)]
+        segments = [*segments, Segment(EASE, amplitude, segments[-1].omega)]
         name += f", {overshoot:g} x amplitude"
-    return Candidate(name, tuple(legs))
+    return Candidate(name, tuple(segments))
 
 
 DRIVE = 0.03
@@ -132,13 +132,13 @@ class Start:
     """
 
     name: str
-    legs: tuple[Leg, ...]
+    segments: tuple[Segment, ...]
     chance: float
 
     @property
     def duration(self) -> float:
         """Duration [s]."""
-        return sum(leg.duration for leg in self.legs)
+        return sum(segment.duration for segment in self.segments)
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,10 +171,10 @@ def plan_starts(
 
     def search() -> list[Any]:
         found = _search(specimen, omega, amplitude, orbit, count, allowed)
-        return [[start.name, [[*astuple(leg)] for leg in start.legs], start.chance] for start in found]
+        return [[start.name, [[*astuple(segment)] for segment in start.segments], start.chance] for start in found]
 
     stored = cached("starts", inputs, search)
-    return [Start(name, tuple(Leg(*leg) for leg in legs), chance) for name, legs, chance in stored]
+    return [Start(name, tuple(Segment(*segment) for segment in segments), chance) for name, segments, chance in stored]
 
 
 def _search(
@@ -195,13 +195,13 @@ def _search(
     most = 0
     for draws, keep in SIEVES:
         most += draws
-        left, won = _sifted(left, won, cases(draws), round(keep * count), most)
+        left, won = _best_candidates(left, won, cases(draws), round(keep * count), most)
     won = _successes(left, cases(RATING))
     chances = (won + 1.0) / (RATING + 2.0)
-    return [Start(left[i].name, left[i].legs, float(chances[i])) for i in _best_first(left, won)]
+    return [Start(left[i].name, left[i].segments, float(chances[i])) for i in _best_first(left, won)]
 
 
-def _sifted(
+def _best_candidates(
     ways: list[Candidate], won: Counts, cases: Sequence[_Case], keep: int, most: int
 ) -> tuple[list[Candidate], Counts]:
     """The `keep` best candidates, best first, after adding these cases, with the total number of cases in which each
@@ -259,9 +259,9 @@ def _best_first(ways: Sequence[Candidate], won: Counts) -> list[int]:
     return sorted(range(len(ways)), key=lambda i: (-won[i], ways[i].duration))
 
 
-def _scaled(way: Candidate, factor: float) -> list[Leg]:
-    legs = [*way.legs, Leg(DWELL, way.legs[-1].amplitude, way.legs[-1].omega)]
-    return [replace(leg, amplitude=factor * leg.amplitude) for leg in legs]
+def _scaled(way: Candidate, factor: float) -> list[Segment]:
+    segments = [*way.segments, Segment(DWELL, way.segments[-1].amplitude, way.segments[-1].omega)]
+    return [replace(segment, amplitude=factor * segment.amplitude) for segment in segments]
 
 
 def _success(motion: Motion, orbit: Orbit | None) -> bool:

@@ -7,7 +7,7 @@ from math import tau
 import numpy as np
 
 from bench.analysis.response_spectrum import DAMPING, pseudo_acceleration
-from bench.analysis.table_motion import Array, TableMotion, at_rest_in_the_end, table_motion
+from bench.analysis.table_motion import Array, TableMotion, table_motion, with_final_rest
 from bench.control.least_change import fit_by_least_change
 from bench.control.target import FLAT, Reach, integrated, windowed
 from sim.errors import InvalidInput
@@ -72,7 +72,7 @@ def high_passed(acceleration: Array, dt: float, corner: float) -> HighPassed:
     gain = np.zeros_like(frequencies)
     gain[1:] = 1.0 / (1.0 + (corner / frequencies[1:]) ** (2 * ORDER))
     filtered = np.fft.irfft(np.fft.rfft(padded, length) * gain, length)[: padded.size]
-    return HighPassed(at_rest_in_the_end(filtered, dt), lead, corner)
+    return HighPassed(with_final_rest(filtered, dt), lead, corner)
 
 
 PERIODS = np.geomspace(0.1, 2.0, 40)

@@ -61,7 +61,7 @@ class TableModel(Parameters):
     noise: Values = quantity(..., "m/s2/Hz^0.5", "amplitude spectral density of the noise in the acceleration")
 
     @model_validator(mode="after")
-    def _lines_of_one_length(self) -> "TableModel":
+    def _check_lengths(self) -> "TableModel":
         n = len(self.frequency)
         for name in ("real", "imaginary", "uncertainty", "distortion", "coherence", "noise"):
             if len(getattr(self, name)) != n:

@@ -55,7 +55,7 @@ def reopen_to_write(file: File) -> File:
     return cast(File, open_to_write(path))
 
 
-def let_go(file: File) -> None:
+def release(file: File) -> None:
     """Close a file that can no longer be written, keeping the flushed data on the disk.
 
     HDF5 tries to write its pending data. If that fails, it frees half of its state and later crashes the process, at
@@ -70,7 +70,7 @@ def let_go(file: File) -> None:
         file.close()
 
 
-def open_again(path: Path) -> AbstractContextManager[File]:
+def open_to_extend(path: Path) -> AbstractContextManager[File]:
     """Open a finished file for additions. Raises OSError if this program already has the file open."""
     return cast("AbstractContextManager[File]", h5py.File(path, "r+", libver=VERSIONS, locking=locking()))
 

@@ -123,12 +123,12 @@ def members(parent: Group, lost: dict[str, str] | None = None) -> Iterator[tuple
     try:
         names, read_only = list(parent), _is_read_only(parent)
     except UNREADABLE as error:
-        names, read_only = _give_up(parent.name, error, lost), False
+        names, read_only = _record_loss(parent.name, error, lost), False
     for name in names:
         try:
             member = _member_or_target(parent, name, read_only)
         except UNREADABLE as error:
-            _give_up(f"{parent.name.rstrip('/')}/{name}", error, lost)
+            _record_loss(f"{parent.name.rstrip('/')}/{name}", error, lost)
         else:
             yield name, member
 
@@ -234,7 +234,7 @@ def _member_or_target(parent: Group, name: str, read_only: bool = False) -> "Dat
     return found.path if isinstance(found, h5py.SoftLink) else cast("Dataset | Group", parent[name])
 
 
-def _give_up(path: str, error: BaseException, lost: dict[str, str] | None) -> list[str]:
+def _record_loss(path: str, error: BaseException, lost: dict[str, str] | None) -> list[str]:
     told = f"{path} cannot be read ({reason(error)})"
     if lost is None:
         raise DataFileError(f"{told}: the file is damaged") from error

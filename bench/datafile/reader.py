@@ -82,7 +82,7 @@ class DataFile(SampleReader):
         truncated.
         """
         self._check_size()
-        self._count_again()
+        self._refresh_counts()
         for path in self._growing:
             with reading(path):
                 hdf5.dataset(self._entry, path).refresh()

@@ -107,7 +107,7 @@ class Recorder:
         self._hold_up = hold_up
         self._failure: DataFileError | None = None
         self._behind: DataFileError | None = None
-        self._told = False
+        self._failure_reported = False
         self._closed = False
         self._committed, self._pressing, self._partial = time.monotonic(), False, False
         # a daemon thread, so that a program that ends with an error does not wait for the recorder; the file remains
@@ -123,7 +123,7 @@ class Recorder:
         if self._failure is not None or self._behind is not None:
             return
         if isinstance(event, Acquired):
-            self._offer(self._checked(event))
+            self._enqueue(self._checked(event))
         elif isinstance(event, PointFinished) and not isinstance(event.point, self._point_type):
             raise DataFileError(
                 f"point of type {type(event.point).__name__} was not recorded: {self.path} is for"
@@ -132,14 +132,14 @@ class Recorder:
         elif not self._writer.has_table(type(event)):
             raise DataFileError(f"{type(event).__name__} was not recorded: name it in `events` of its protocol")
         elif not isinstance(event, Progress):
-            self._offer(event)
+            self._enqueue(event)
 
     def sync(self) -> None:
         """Wait until all queued events are in the file. Raises DataFileError, once, if they could not be written."""
         if not self._closed:
             marker = _Sync(threading.Event())
             if not (self._put(marker, PATIENCE) and waiting.wait(marker.done, PATIENCE)):
-                self._fall_behind(f"has not responded for {PATIENCE:g} s")
+                self._stop_recording(f"has not responded for {PATIENCE:g} s")
         self._raise_failure()
 
     def close(self, status: Status | str, summary: str = "") -> None:
@@ -158,12 +158,12 @@ class Recorder:
         # wakes a waiting thread; a thread that is writing checks for the end itself
         self._put(_Sync(threading.Event()), 0.0)
         if not waiting.join(self._thread, PATIENCE):
-            self._fall_behind(f"has not responded for {PATIENCE:g} s")
+            self._stop_recording(f"has not responded for {PATIENCE:g} s")
         self._raise_failure()
 
-    def _offer(self, item: _Block | Event) -> None:
+    def _enqueue(self, item: _Block | Event) -> None:
         if not self._put(item, self._hold_up):
-            self._fall_behind(f"is {BACKLOG} events behind")
+            self._stop_recording(f"is {BACKLOG} events behind")
             self._raise_failure()
 
     def _put(self, item: _Block | Event | _Sync, patience: float) -> bool:
@@ -173,7 +173,7 @@ class Recorder:
             self._wanted.set()
         return queued
 
-    def _fall_behind(self, how: str) -> None:
+    def _stop_recording(self, how: str) -> None:
         """Note that the disk is too slow: pending data are still written if it recovers, new data are ignored."""
         told = f"recording to {self.path} has stopped because its disk {how}: earlier data are readable; check the disk"
         self._behind = self._behind or DataFileError(told)
@@ -194,8 +194,8 @@ class Recorder:
         again.
         """
         failure = self._failure or self._behind
-        if failure is not None and not self._told:
-            self._told = True
+        if failure is not None and not self._failure_reported:
+            self._failure_reported = True
             raise failure
 
     def _work(self) -> None:

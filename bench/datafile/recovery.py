@@ -153,7 +153,7 @@ def _text(record: DataFile, path: str) -> str:
         return ""
 
 
-_MADE_ANEW = frozenset(
+_RENEWED = frozenset(
     f"/entry/{name}" for name in ("complete", "status", "summary", "end_time", "data", CHECKSUMS, FIT_VIEWS, NOTE)
 )
 _ROWS_TOGETHER = 2**18
@@ -183,7 +183,7 @@ def _rebuild(record: DataFile, path: Path, temporary: Path, target: Path, progre
     progress("copying the intact data")
     file = hdf5.create(temporary)
     try:
-        copying = Copying(_counted(record, judged), path.stat().st_size, _MADE_ANEW)
+        copying = Copying(_counted(record, judged), path.stat().st_size, _RENEWED)
         copying.copy(hdf5.group(record.file, "/"), hdf5.group(file, "/"))
         file.attrs["format"], file.attrs["format_version"] = FORMAT, FORMAT_VERSION
         entry = hdf5.group(file, "entry")
@@ -192,8 +192,8 @@ def _rebuild(record: DataFile, path: Path, temporary: Path, target: Path, progre
         renew_drive(entry)
         renew_tables(entry, copying.lost, record.own_tables)
         cut(entry, copying.counted)
-        gone = {at: told for at, told in copying.lost.items() if not _is_made_anew(at)}
-        damage = gone | {at: told for at, told in judged.failing.items() if not _is_made_anew(at)}
+        gone = {at: told for at, told in copying.lost.items() if not _is_renewed(at)}
+        damage = gone | {at: told for at, told in judged.failing.items() if not _is_renewed(at)}
         events = points = 0
         try:
             events, points = add_lost_events(entry, list(read_journal(journal_path(path))))
@@ -225,8 +225,8 @@ def _require_channels(entry: hdf5.Group) -> None:
         raise DataFileError("no channel can be read")
 
 
-def _is_made_anew(path: str) -> bool:
-    return any(path == each or path.startswith(f"{each}/") for each in _MADE_ANEW)
+def _is_renewed(path: str) -> bool:
+    return any(path == each or path.startswith(f"{each}/") for each in _RENEWED)
 
 
 def _counted(record: DataFile, judged: Integrity) -> Mapping[str, int]:

@@ -80,7 +80,7 @@ class SampleReader:
     def __init__(self, entry: hdf5.Group) -> None:
         self._entry = entry
         self._instrument = hdf5.group(entry, "instrument")
-        self._count_again()
+        self._refresh_counts()
 
     @cached_property
     def sample_rate(self) -> float:
@@ -186,7 +186,7 @@ class SampleReader:
         """
         return counts(self._entry)
 
-    def _count_again(self) -> None:
+    def _refresh_counts(self) -> None:
         hdf5.dataset(self._entry, "complete").refresh()
         self.__dict__.pop("counted", None)
         self.__dict__.pop("blocks", None)

@@ -85,7 +85,7 @@ ROOM = 1_000_000
 """Free space required before a file is created [bytes]: many times the size of an empty file."""
 
 
-def _try_folder(folder: Path) -> None:
+def _check_folder(folder: Path) -> None:
     """Raise OSError unless a file of some size can be created in `folder`.
 
     HDF5 does not report the cause of a failure clearly, and crashes the process if the disk becomes full during
@@ -110,7 +110,7 @@ class DataFileWriter:
             if taken.exists():
                 raise InvalidInput("record", str(taken), _EXISTS)
         try:
-            _try_folder(path.parent)
+            _check_folder(path.parent)
             self._file = hdf5.create(path)
         except FileExistsError:
             raise InvalidInput("record", str(path), _EXISTS) from None
@@ -129,7 +129,7 @@ class DataFileWriter:
             self._file_sync = FileSync(path)
             self._file_sync.sync()
         except (OSError, RuntimeError) as error:
-            hdf5.let_go(self._file)
+            hdf5.release(self._file)
             path.unlink(missing_ok=True)
             raise DataFileError(f"{path} could not be created ({reason(error)}): check the disk") from error
         self._counters = counters(skeleton.own)
@@ -218,14 +218,14 @@ class DataFileWriter:
         self._file.close()
         if whole := len(self._parts.rows["fits"]):
             # the data are complete without the views; if another program holds the file now, a recovery adds them later
-            with suppress(OSError, RuntimeError), hdf5.open_again(self._path) as file:
+            with suppress(OSError, RuntimeError), hdf5.open_to_extend(self._path) as file:
                 add_fit_views(hdf5.group(file, "entry"), whole)
         self._file_sync.sync()
         self._let_go()
 
     def abandon(self) -> None:
         """Release the file after an error. Committed data stay readable."""
-        hdf5.let_go(self._file)
+        hdf5.release(self._file)
         self._file_sync.restore()
         self._let_go()
 

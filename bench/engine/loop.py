@@ -203,10 +203,10 @@ class SineDrive:
     def sweep(self, step: Sweep) -> Outcome:
         """Drive the segments of the sweep, starting at the present amplitude and frequency."""
         output = self._loop.output
-        output.source.require_silence("legs")
+        output.source.require_silence("segments")
         oscillator = output.source.oscillator
         self.restart()
-        for sweep in sweeps(step.legs, oscillator.amplitude, oscillator.omega):
+        for sweep in sweeps(step.segments, oscillator.amplitude, oscillator.omega):
             oscillator.follow(sweep)
         end = output.begins + oscillator.remaining
         while output.read < end:

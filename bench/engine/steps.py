@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.analysis.cycles import Cycle
-from bench.control.oscillator import DriveCalibration, Leg
+from bench.control.oscillator import DriveCalibration, Segment
 from bench.events import Event
 from bench.guard.limits import Violation
 from drivers.rig import Channel, Counts, OperatorTask
@@ -63,9 +63,9 @@ class Calibrate:
 
 @dataclass(frozen=True)
 class Sweep:
-    """Sweep along `legs` from the present sine. Returns `Fallen` as soon as the block has fallen, else `Done`."""
+    """Sweep along `segments` from the present sine. Returns `Fallen` as soon as the block has fallen, else `Done`."""
 
-    legs: tuple[Leg, ...]
+    segments: tuple[Segment, ...]
 
 
 @dataclass(frozen=True)

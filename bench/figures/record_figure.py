@@ -157,7 +157,7 @@ def _draw(part: "SubFigure", record: RecordPicture) -> None:
 
 def _draw_history(panel: "Axes", values: Array, dt: float, colour: str) -> None:
     """Draws a history with a mark and the value at its peak."""
-    time, shown = _thinned(values, dt)
+    time, shown = _drawn_points(values, dt)
     panel.plot(time, shown, color=colour, linewidth=0.7)
     at = int(np.abs(values).argmax())
     late = at > LATE * values.size
@@ -178,7 +178,7 @@ def _draw_history(panel: "Axes", values: Array, dt: float, colour: str) -> None:
     set_grid(panel)
 
 
-def _thinned(values: Array, dt: float) -> tuple[Array, Array]:
+def _drawn_points(values: Array, dt: float) -> tuple[Array, Array]:
     """Time and values of the drawn points, shape (k,); keeps every peak."""
     time: Array = dt * np.arange(values.size, dtype=np.float64)
     if values.size <= MOST_POINTS:

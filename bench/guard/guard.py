@@ -159,7 +159,7 @@ class Guard:
             self.abort()
         opened = self._opened()
         if opened:
-            self._cut_because(opened)
+            self._cut_output(opened)
         runaway = next((violation for violation in exceeded if violation.of_table), None)
         return Exchange(
             block,
@@ -234,7 +234,7 @@ class Guard:
         """Stop the rig and bring its output to zero."""
         self._rig.stop()
 
-    def _cut_because(self, opened: tuple[str, ...]) -> None:
+    def _cut_output(self, opened: tuple[str, ...]) -> None:
         try:
             self.halt()
         except RigError as error:

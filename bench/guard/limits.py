@@ -110,7 +110,7 @@ class Ramps(Parameters):
     abort: float = quantity(0.5, "s", "duration of the fast ramp, for an abort", ge=0.05, le=10)
 
     @model_validator(mode="after")
-    def _abort_is_the_fast_one(self) -> "Ramps":
+    def _check_durations(self) -> "Ramps":
         if self.abort > self.stop:
             raise ValueError("abort must not be longer than stop")
         return self

@@ -7,7 +7,7 @@ from math import inf, nan
 import numpy as np
 
 from bench.config.model import BenchConfiguration
-from bench.control.oscillator import Leg
+from bench.control.oscillator import Segment
 from bench.datafile.tables import Column, Table
 from bench.guard.motion import WATCHED
 from sim.channel import STOREYS
@@ -34,7 +34,7 @@ class Stage:
     """Part of a run: the segments of the table motion from rest, and the estimated probability of success, if known."""
 
     name: str
-    legs: tuple[Leg, ...]
+    segments: tuple[Segment, ...]
     chance: float | None = None
 
 
@@ -206,18 +206,18 @@ def margins_table(margins: Sequence[Margin]) -> Table:
 
 def drive_table(stages: Sequence[Stage]) -> Table:
     """Table with one row for each segment of the planned drive; every stage starts at zero drive."""
-    rows = [(stage, leg) for stage in stages for leg in stage.legs]
+    rows = [(stage, segment) for stage in stages for segment in stage.segments]
     chances = [nan if stage.chance is None else stage.chance for stage, _ in rows]
     return {
         "stage": Column(np.array([stage.name for stage, _ in rows], dtype=np.str_), "", "part of the run"),
         "chance": Column(
             np.array(chances), "1", "estimated probability that the start succeeds; NaN if it is no start"
         ),
-        "duration": Column(np.array([leg.duration for _, leg in rows]), "s", "duration of the segment"),
+        "duration": Column(np.array([segment.duration for _, segment in rows]), "s", "duration of the segment"),
         "amplitude": Column(
-            np.array([leg.amplitude for _, leg in rows]), "m/s2", "table acceleration at the end of the segment"
+            np.array([segment.amplitude for _, segment in rows]), "m/s2", "table acceleration at the end of the segment"
         ),
         "omega": Column(
-            np.array([leg.omega for _, leg in rows]), "rad/s", "circular frequency at the end of the segment"
+            np.array([segment.omega for _, segment in rows]), "rad/s", "circular frequency at the end of the segment"
         ),
     }

@@ -52,7 +52,7 @@ def follow(
     heard = [follower, *subscribers]
     plan = _watched(prepared.plan(), follower)
     replayed = replay(record, plan, configuration, clock=VirtualClock(), subscribers=heard)
-    if (why := replayed.parted(POINTS)) is not None:
+    if (why := replayed.first_difference(POINTS)) is not None:
         raise NotComparable(f"this software does not reproduce the recording with the same settings: {why}")
     return replayed, tuple(follower.points)
 
@@ -66,7 +66,7 @@ def carry_out(
     table differently, because the recorded motion is not the response to that drive.
     """
     replayed = replay(record, changed.plan(), configuration, clock=VirtualClock(), subscribers=subscribers)
-    if (why := replayed.parted(DRIVE)) is not None:
+    if (why := replayed.first_difference(DRIVE)) is not None:
         raise NotComparable(f"these settings would change the drive of the table ({why}): repeat the measurement")
     return replayed, replayed.points
 
@@ -119,7 +119,7 @@ def write_analysis(original: Path, record: DataFile, analysis: Analysis, out: Pa
                     _fill(file, original, digest, record, analysis)
                     file.close()
                 except BaseException:
-                    hdf5.let_go(file)
+                    hdf5.release(file)
                     raise
                 whole(path)
         except (OSError, RuntimeError) as error:

@@ -210,11 +210,11 @@ def _compare_rows(
     largest, scales = 0.0, _scales(stored)
     for number, (was, now) in enumerate(zip(stored, came, strict=False), 1):
         for name in (now.keys() & was.keys()) - {"time"}:
-            if not (same_wording and same_intervals) and _are_sentences(was[name], now[name]):
+            if not (same_wording and same_intervals) and _is_wording(was[name], now[name]):
                 continue
             if not same_intervals and any(part in name for part in OF_INTERVALS):
                 continue
-            apart = _apart(was[name], now[name], scales.get(name, 0.0))
+            apart = _relative_difference(was[name], now[name], scales.get(name, 0.0))
             if apart > rounding:
                 text = f"row {number} of {what}: {name} was {was[name]!r} and is {_plain(now[name])!r}"
                 found.differences.append(Difference(text, what))
@@ -229,7 +229,7 @@ def _plain(value: Any) -> Any:
     return value.value if isinstance(value, Enum) else value
 
 
-def _are_sentences(was: Any, now: Any) -> bool:
+def _is_wording(was: Any, now: Any) -> bool:
     """Whether both values are sentences, which depend on the wording version, and not names, codes or JSON."""
     if isinstance(now, Enum) or not (isinstance(was, str) and isinstance(now, str) and was and now):
         return False
@@ -246,7 +246,7 @@ def _scales(rows: Sequence[Mapping[str, Any]]) -> dict[str, float]:
     return scales
 
 
-def _apart(was: Any, now: Any, scale: float) -> float:
+def _relative_difference(was: Any, now: Any, scale: float) -> float:
     """Difference of two values relative to `scale` or the larger of them; infinite for unequal values that are not
     numbers.
     """

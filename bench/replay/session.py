@@ -119,7 +119,7 @@ class Replayed:
     same_intervals: bool
     returned: object = None
 
-    def parted(self, part: str) -> str | None:
+    def first_difference(self, part: str) -> str | None:
         """First difference in `part` that is larger than rounding, or None."""
         return next((each.text for each in self.found.differences if each.part == part and not each.rounding), None)
 
@@ -161,8 +161,8 @@ def replay(
             stream.publish(Warned(warning))
         with live_twin(stream, rig, configuration, requests, patient=True):
             ending = engine.run(plan)
-        over = rig.over
-    broke_off = _broke_off(record, over)
+        over = rig.overrun
+    broke_off = _early_end(record, over)
     found = comparison.finish(ending.reason.partition("; then ")[0] if broke_off else None)
     same_summary = not course.same_wording or record.summary == ending.reason
     if broke_off is None and not (record.status == ending.status and same_summary):
@@ -189,7 +189,7 @@ def replay(
     )
 
 
-def _broke_off(record: DataFile, over: str | None) -> str | None:
+def _early_end(record: DataFile, over: str | None) -> str | None:
     """Text that states where and why the recording ends before its plan; None if the plan ended."""
     if record.status == UNFINISHED:
         return f"{over or 'it ends'}: the program that wrote it was killed, or is still writing"

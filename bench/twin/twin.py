@@ -139,7 +139,7 @@ class Twin:
                 # the published gain is that of the preceding test
                 self._measured = None
                 if event.after in (State.IDLE, State.HALTED, State.ARMED):
-                    self._leave()
+                    self._end_run()
             case Acquired():
                 self._acquired(event)
             case Estimate() | RunningGain():
@@ -161,7 +161,7 @@ class Twin:
         if self._run is None:
             return
         if self._collect(self._run, event.time):
-            self._offer(self._run, event)
+            self._enqueue(self._run, event)
 
     def _begin(self, number: int, members: Future[Members]) -> None:
         twin = self._configuration.twin
@@ -169,7 +169,7 @@ class Twin:
         warn, stop = (Limit(limit, twin.persistence) for limit in (twin.residual_warn, twin.residual_stop))
         self._run = _Run(estimator, warn, stop)
 
-    def _leave(self) -> None:
+    def _end_run(self) -> None:
         run, self._run = self._run, None
         if run is not None:
             for each in run.waiting:
@@ -182,16 +182,16 @@ class Twin:
                 estimate = waiting.result(run.waiting.popleft())
             except Exception as error:
                 # an error in the twin must not end a test
-                self._give_up(now, f"the twin is off until the rig is armed again: {error}")
+                self._suspend(now, f"the twin is off until the rig is armed again: {error}")
                 return False
             if estimate is not None:
                 self._publish(estimate)
                 self._judge(run, estimate, now)
         return True
 
-    def _offer(self, run: _Run, event: Acquired) -> None:
+    def _enqueue(self, run: _Run, event: Acquired) -> None:
         if len(run.waiting) >= self._most:
-            self._give_up(
+            self._suspend(
                 event.time, f"{_NOT_IN_TIME}: {len(run.waiting)} blocks are waiting for its model", realtime=True
             )
             return
@@ -200,8 +200,8 @@ class Twin:
         taking = self._worker.submit(_take, run.estimator, event.time, end, event.signals, self._measured, shed)
         run.waiting.append(taking)
 
-    def _give_up(self, now: float, why: str, *, realtime: bool = False) -> None:
-        self._leave()
+    def _suspend(self, now: float, why: str, *, realtime: bool = False) -> None:
+        self._end_run()
         self._publish(Warned(why, realtime, time=now))
 
     def _judge(self, run: _Run, estimate: TwinEstimate, now: float) -> None:

@@ -109,7 +109,7 @@ class Inputs:
         self._read = self._reader.read_int16 if self.dtype is np.int16 else self._reader.read_int32
         self._raw: NDArray[np.int16 | np.int32] = np.empty((len(inputs), 0), self.dtype)
 
-    def are_ours(self) -> bool:
+    def is_owner(self) -> bool:
         """Whether this client still owns the task. A server identifies tasks by name, and the tasks of all clients have
         the same name.
         """

@@ -179,7 +179,7 @@ class Daq(Parameters):
         }
 
     @model_validator(mode="after")
-    def _no_line_twice(self) -> "Daq":
+    def _check_lines_unique(self) -> "Daq":
         seen: dict[str, str] = {}
         for item, line in self.digital_lines.items():
             if (other := seen.setdefault(line.strip("/").lower(), item)) != item:
@@ -187,7 +187,7 @@ class Daq(Parameters):
         return self
 
     @model_validator(mode="after")
-    def _safety_inputs_need_something_to_open(self) -> "Daq":
+    def _check_safety_inputs(self) -> "Daq":
         if self.heartbeat is not None and self.enable_line is None:
             raise InvalidInput("heartbeat.line", self.heartbeat.line, "it requires enable_line")
         return self

@@ -111,7 +111,7 @@ class DaqSession:
                 raise ConnectionLost("prepare is refused: the device was lost in an earlier run; open a new session")
             if self._tasks.was_reset:
                 raise ConnectionLost("prepare is refused: the device had to be reset; open a new session")
-            if not self._tasks.inputs.are_ours():
+            if not self._tasks.inputs.is_owner():
                 raise ConnectionLost("prepare is refused: another client has taken the device; open a new session")
             # repeat a stop that has failed
             self._rest()

@@ -165,7 +165,7 @@ class Tasks:
     def clear(self) -> None:
         """Release all tasks, once, if the driver responds and no other client owns them."""
         with self._made, suppress(RigError):
-            if not self.inputs.are_ours():
+            if not self.inputs.is_owner():
                 self._made.pop_all()
                 if self.watchdog is not None:
                     self.watchdog.let_go()

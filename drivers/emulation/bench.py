@@ -43,7 +43,7 @@ class EmulatedBench:
         self._rate = parameters.sample_rate * (1.0 + clock_error)
         kept = round(_KEPT * parameters.sample_rate)
         self._counts = History(kept, self.terminals, np.int16)
-        self._seen = History(kept, 4, np.float64)
+        self._displacements = History(kept, 4, np.float64)
         laser, lsb = parameters.laser_1, parameters.converter.lsb
         self._error_counts = round(laser.error_current * laser.load / lsb)
         self._outputs: dict[int, Callable[[], bool]] = {}
@@ -61,7 +61,7 @@ class EmulatedBench:
 
     def start(self) -> None:
         """Start the thread that advances the bench."""
-        while self._seen.end < 2:
+        while self._displacements.end < 2:
             # two ticks, so that an interval exists
             self._advance()
         self._thread.start()
@@ -135,18 +135,21 @@ class EmulatedBench:
         """Target of the laser on storey 1 or 2: the storey, or the block while laser 2 is aimed at it."""
         return Storey(self, storey)
 
-    def seen(self, storey: int, times: NDArray[np.float64]) -> NDArray[np.float64]:
+    def target_displacement(self, storey: int, times: NDArray[np.float64]) -> NDArray[np.float64]:
         """Displacement [m] of the target of a storey's laser at monotonic times [s], with cubic interpolation between
         ticks.
         """
         ticks = (times - self._started) * self._rate
         with self.lock:
-            if ticks.size and ticks[-1] > self._seen.end - 1:
+            if ticks.size and ticks[-1] > self._displacements.end - 1:
                 self._advance()
-            ticks = np.clip(ticks, 0.0, self._seen.end - 1)
-            before = np.minimum(np.floor(ticks).astype(np.int64), max(self._seen.end - 2, 0))
+            ticks = np.clip(ticks, 0.0, self._displacements.end - 1)
+            before = np.minimum(np.floor(ticks).astype(np.int64), max(self._displacements.end - 2, 0))
             columns = [2 * (storey - 1), 2 * (storey - 1) + 1]
-            (x0, v0), (x1, v1) = self._seen.at(before)[:, columns].T, self._seen.at(before + 1)[:, columns].T
+            (x0, v0), (x1, v1) = (
+                self._displacements.at(before)[:, columns].T,
+                self._displacements.at(before + 1)[:, columns].T,
+            )
         place, length = ticks - before, 1.0 / self.tick_rate
         rest = 1.0 - place
         start = x0 * (1.0 + 2.0 * place) + length * v0 * place
@@ -196,7 +199,7 @@ class EmulatedBench:
             if not live():
                 counts[:, column] = self._error_counts
         self._counts.append(counts)
-        self._seen.append(self._bench.sights.T)
+        self._displacements.append(self._bench.sights.T)
         if self._subscriber is not None:
             self._subscriber(self._bench.truth.x)
 
@@ -208,4 +211,4 @@ class Storey:
         self._bench, self._storey = bench, storey
 
     def displacement(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
-        return self._bench.seen(self._storey, times)
+        return self._bench.target_displacement(self._storey, times)

@@ -53,7 +53,7 @@ class ControlServer:
                 waiting.join(self._accepting)
             self._listening.close()
         for connection, thread in served:
-            _hang_up(connection)
+            _shut_down_input(connection)
             waiting.join(thread)
 
     def _accept(self) -> None:
@@ -115,7 +115,7 @@ def _requests(lines: BinaryIO) -> Iterator[bytes]:
         yield line
 
 
-def _hang_up(connection: socket.socket) -> None:
+def _shut_down_input(connection: socket.socket) -> None:
     """End the input of a connection, so that the thread that reads it ends; does nothing on a closed connection."""
     with suppress(OSError):
         connection.shutdown(socket.SHUT_RD)

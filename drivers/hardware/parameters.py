@@ -17,7 +17,7 @@ class CalibratedInput(AnalogInput):
     zero: float
 
     @model_validator(mode="after")
-    def _a_calibration_that_tells_something(self) -> "CalibratedInput":
+    def _check_calibration(self) -> "CalibratedInput":
         if self.sensitivity == 0.0:
             raise InvalidInput("sensitivity", self.sensitivity, "volts per unit, not 0")
         if abs(self.zero) >= self.range:
@@ -207,7 +207,7 @@ class Hardware(Parameters):
         return (STOREYS[0], self.laser_1), (STOREYS[1], self.laser_2)
 
     @model_validator(mode="after")
-    def _no_terminal_twice(self) -> "Hardware":
+    def _check_terminals_unique(self) -> "Hardware":
         seen: dict[str, str] = {}
         for name, given in (*self.transducers, *self.analogue_lasers):
             if (other := seen.setdefault(given.terminal.lower(), name)) != name:

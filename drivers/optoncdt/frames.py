@@ -29,7 +29,7 @@ class Layout:
     time: tuple[int, int] | None
 
 
-def wanted(rate: float, baud: int) -> tuple[str, ...]:
+def additional_signals(rate: float, baud: int) -> tuple[str, ...]:
     """The additional signals that fit on the line at `rate` [1/s]: counter and time stamp, or the counter alone.
 
     Raises InvalidInput if the counter does not fit, since a lost value would go unnoticed without it.

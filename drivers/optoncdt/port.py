@@ -36,7 +36,7 @@ def open_port(name: str, port: str, baud: int) -> Serial:
         opened = Serial(port, baud, timeout=_READ_TIMEOUT, write_timeout=_WRITE_TIMEOUT, exclusive=True)
     except _PORT_ERRORS as error:
         raise DeviceNotFound(f"{name} cannot be opened: {_reason(port, error)}") from error
-    _hurry(opened)
+    _set_low_latency(opened)
     return opened
 
 
@@ -49,7 +49,7 @@ def has_baud(port: Serial, baud: int) -> bool:
     return True
 
 
-def _hurry(port: Serial) -> None:
+def _set_low_latency(port: Serial) -> None:
     """Set the adapter's low-latency mode if supported, and enlarge the receive buffer where the default is small."""
     if sys.platform == "win32":
         port.set_buffer_size(rx_size=_WINDOWS_BUFFER)

@@ -94,7 +94,7 @@ def silenced(dialogue: Dialogue, item: str, baud: int | None) -> Answer:
     return answer
 
 
-def asked(dialogue: Dialogue) -> Answer | None:
+def detect_sensor(dialogue: Dialogue) -> Answer | None:
     """Detect baud rate and sensor without changing the sensor's settings; None if nothing responds."""
     return _search(dialogue, BAUDS, "GETUSERLEVEL")
 
@@ -169,7 +169,7 @@ def find_lasers(ports: Sequence[str] | None = None) -> list[FoundLaser]:
 def _probed(port: str) -> FoundLaser:
     try:
         with open_port("the port", port, FACTORY_BAUD) as opened:
-            answer = asked(Dialogue(port, opened))
+            answer = detect_sensor(Dialogue(port, opened))
     except RigError as error:
         return FoundLaser(port, None, None, str(error))
     if answer is None:

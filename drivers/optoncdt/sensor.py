@@ -7,7 +7,7 @@ from typing import Self
 from drivers.clock import now
 from drivers.errors import ConnectionLost, DeviceNotFound, DeviceTimeout, RigError
 from drivers.optoncdt.dialogue import SLOW, CommandRefused, Dialogue
-from drivers.optoncdt.frames import Layout, layout_in, wanted
+from drivers.optoncdt.frames import Layout, additional_signals, layout_in
 from drivers.optoncdt.line import Line
 from drivers.optoncdt.port import open_port
 from drivers.optoncdt.search import BAUDS, SensorInfo, silenced
@@ -44,7 +44,7 @@ def configure(dialogue: Dialogue, rate: float, baud: int) -> tuple[Layout, bool]
 
     Raises InvalidInput for a rate that line or sensor does not support, RigError if the sensor rejects a setting.
     """
-    signals = wanted(rate, baud)
+    signals = additional_signals(rate, baud)
     dialogue.ask("ECHO OFF")
     _require_no_mastering(dialogue)
     is_known = _set_rate(dialogue, rate)

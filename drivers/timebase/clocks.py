@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.timebase.fit import Bounds, Points, bends, due, floor_below, rate_error, typical
+from drivers.timebase.fit import Bounds, Points, bends, floor_below, needs_refit, rate_error, typical
 
 _TOLERANCE = 0.25
 """Largest deviation of a history from a line, in sample periods, before its older half is discarded. Since counts are
@@ -62,7 +62,7 @@ class SampleClock:
 
     def _refresh(self) -> None:
         history = self._now - self._began
-        if not self._looks or not due(history, self._fitted):
+        if not self._looks or not needs_refit(history, self._fitted):
             return
         self._fitted = history
         self._take_looks()
@@ -151,7 +151,7 @@ class SensorClock:
         return self._residual
 
     def _refresh(self) -> None:
-        if not len(self._bounds.points) or not due(self.history, self._fitted):
+        if not len(self._bounds.points) or not needs_refit(self.history, self._fitted):
             return
         self._fitted = self.history
         self._slope = rate_error([(self._bounds.points, 1.0)])

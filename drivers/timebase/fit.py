@@ -89,7 +89,7 @@ _PATIENCE = 1.0
 """Growth of the history [s] after which a line is refitted; bounds the work per iteration of the acquisition loop."""
 
 
-def due(history: float, fitted: float) -> bool:
+def needs_refit(history: float, fitted: float) -> bool:
     """Whether a line over `history` [s] must be refitted if it was last fitted at `fitted` [s]."""
     return history - fitted >= min(_GROWTH * history, _PATIENCE)
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from bench.analysis.check_line import CheckLine, Verdict, failed, untested
 from bench.analysis.signals import ACCELERATION, DISPLACEMENT, LASER_1, LASER_2, SIGNALS
 from bench.config.model import BenchConfiguration
-from bench.control.oscillator import Leg
+from bench.control.oscillator import Segment
 from bench.datafile.tables import Column, Table
 from bench.engine.steps import (
     AcquireAtRest,
@@ -119,15 +119,15 @@ def _steps(parameters: CheckParameters, configuration: BenchConfiguration) -> Ge
     bare = configuration.known_specimen.bare()
     yield OperatorAction(OperatorTask.LOCK_FRAME, bare, _CLAMP)
     yield Publish(StepStarted("acquire at rest"))
-    heard = yield AcquireAtRest(parameters.rest)
-    if not isinstance(heard, RestSamples):
-        raise TypeError(f"the acquisition at rest ended with {heard}")
+    at_rest = yield AcquireAtRest(parameters.rest)
+    if not isinstance(at_rest, RestSamples):
+        raise TypeError(f"the acquisition at rest ended with {at_rest}")
     yield from _publish(safety_lines(configuration))
-    resting = list(resting_lines(heard, parameters, configuration.analysis))
-    if heard.violation is not None and all(line.verdict is not Verdict.FAILED for line in resting):
-        resting.append(failed("table", "rest", f"{heard.violation} at zero drive: check amplifier and limits"))
+    resting = list(resting_lines(at_rest, parameters, configuration.analysis))
+    if at_rest.violation is not None and all(line.verdict is not Verdict.FAILED for line in resting):
+        resting.append(failed("table", "rest", f"{at_rest.violation} at zero drive: check amplifier and limits"))
     yield from _publish(resting)
-    yield from _publish(input_lines(heard.channels))
+    yield from _publish(input_lines(at_rest.channels))
     if any(line.verdict is Verdict.FAILED for line in resting):
         remedy = "the table was not moved: correct the failed lines, then check again"
         yield from _publish([untested("bench", "motion", remedy)])
@@ -179,7 +179,7 @@ def _measured_sines(parameters: CheckParameters) -> Generator[Step, Outcome, Sin
     for index, omega in enumerate(omegas):
         yield Publish(StepStarted(f"common motion at {omega:g} rad/s"))
         yield Publish(_progress(omegas, index, parameters))
-        yield Sweep((Leg(CHANGE_TIME, parameters.velocity * omega, omega),))
+        yield Sweep((Segment(CHANGE_TIME, parameters.velocity * omega, omega),))
         outcome = yield Dwell(SETTLING + parameters.cycles)
         if not isinstance(outcome, Measured):
             raise Unmeasurable(_FALLEN)

@@ -35,7 +35,7 @@ _MISSING = "the program does not read this input: make sure that its contact ope
 _ALONE = "nothing opens the enable relay if the program crashes: wire a heartbeat relay, or set a watchdog"
 
 
-def resting_lines(heard: RestSamples, parameters: CheckParameters, accuracy: SensorAccuracy) -> Iterator[CheckLine]:
+def resting_lines(samples: RestSamples, parameters: CheckParameters, accuracy: SensorAccuracy) -> Iterator[CheckLine]:
     """Two lines for each channel: fraction of valid samples, and noise if enough samples are valid. The noise of a
     laser may be as large as its resolution; larger noise originates in the target or the bench.
     """
@@ -44,8 +44,8 @@ def resting_lines(heard: RestSamples, parameters: CheckParameters, accuracy: Sen
         TABLE_ACCELERATION: parameters.acceleration_noise,
         **dict.fromkeys(STOREYS, accuracy.laser_resolution),
     }
-    for column, channel in enumerate(heard.channels):
-        counts = heard.counts[:, column]
+    for column, channel in enumerate(samples.channels):
+        counts = samples.counts[:, column]
         valid = (counts >= channel.valid[0]) & (counts <= channel.valid[1])
         share = float(valid.mean())
         what = "valid samples at rest"

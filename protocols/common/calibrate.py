@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from bench.analysis.cycles import Cycle, mean_amplitude
 from bench.analysis.signals import ACCELERATION, SIGNALS
-from bench.control.oscillator import DriveCalibration, Leg
+from bench.control.oscillator import DriveCalibration, Segment
 from bench.engine.steps import Calibrate, Dwell, Fallen, Measured, Outcome, Step, Sweep
 from sim.errors import RockbenchError
 
@@ -52,7 +52,7 @@ def calibrate_drive(
             response = yield from _measure(omegas[0], volts * abs(start.response[0]))
             if isinstance(response, Fallen):
                 return response
-            yield Sweep((Leg(CHANGE_TIME, 0.0, omegas[0]),))
+            yield Sweep((Segment(CHANGE_TIME, 0.0, omegas[0]),))
             start = DriveCalibration.flat(response)
     yield Calibrate(start)
     points: dict[float, complex] = {}
@@ -63,11 +63,11 @@ def calibrate_drive(
         points[omega] = response
         if not known:
             # change the calibration at rest, so that the drive does not jump
-            outcome = yield Sweep((Leg(CHANGE_TIME, 0.0, omega),))
+            outcome = yield Sweep((Segment(CHANGE_TIME, 0.0, omega),))
             if isinstance(outcome, Fallen):
                 return outcome
             yield Calibrate(_of(points))
-    outcome = yield Sweep((Leg(CHANGE_TIME, 0.0, max(omegas)),))
+    outcome = yield Sweep((Segment(CHANGE_TIME, 0.0, max(omegas)),))
     return outcome if isinstance(outcome, Fallen) else _of(points)
 
 
@@ -80,12 +80,12 @@ def probed_drive(omega: float) -> Generator[Step, Outcome, DriveCalibration]:
     yield Calibrate(DriveCalibration.flat(1.0))
     answer = np.zeros(0, dtype=np.complex128)
     for volts in (PROBE, 10.0 * PROBE):
-        yield Sweep((Leg(CHANGE_TIME, volts, omega),))
+        yield Sweep((Segment(CHANGE_TIME, volts, omega),))
         outcome = yield Dwell(SETTLING + _PROBED)
         cycles = outcome.cycles[SETTLING:] if isinstance(outcome, Measured) else ()
         need_cycles(cycles, _PROBED)
         answer = np.array([cycle.fundamental[ACCELERATION] / cycle.fundamental[_DRIVE] for cycle in cycles])
-    yield Sweep((Leg(CHANGE_TIME, 0.0, omega),))
+    yield Sweep((Segment(CHANGE_TIME, 0.0, omega),))
     gain, doubt = abs(complex(answer.mean())), _standard_error(answer)
     if not gain > AUDIBLE * doubt:
         raise Unmeasurable(
@@ -111,7 +111,7 @@ def _of(points: dict[float, complex]) -> DriveCalibration:
 
 def _measure(omega: float, amplitude: float) -> Generator[Step, Outcome, complex | Fallen]:
     """Response [m/s2 per V] at one frequency."""
-    outcome = yield Sweep((Leg(CHANGE_TIME, amplitude, omega),))
+    outcome = yield Sweep((Segment(CHANGE_TIME, amplitude, omega),))
     if isinstance(outcome, Fallen):
         return outcome
     outcome = yield Dwell(SETTLING + MEASURED)

@@ -192,7 +192,7 @@ class CouplingStiffness(Prepared[CouplingStiffnessParameters]):
         pace.elapsed += BY_HAND
         pulse = self._pulses[name]
         decays = yield from pulsed_decays(self.parameters, self.configuration, pulse, setting, pace, name, point)
-        result = frame_result(decays, setting.masses, setting.weighed)
+        result = frame_result(decays, setting.masses, setting.masses_covariance)
         if result.nonlinear.any():
             yield Publish(Warned(f"{name}: {nonlinear_text(result)}"))
         return result

@@ -110,7 +110,7 @@ def _draw_decay(panel: "Axes", below: "Axes", spring: SpringResult) -> None:
     fit = decay.fit
     shown = fit.stretch.time < decay.begin + SHOWN
     time = fit.stretch.time[shown]
-    measured, fitted = ((each[1] - each[0])[shown] for each in (fit.stretch.seen, fit.fitted))
+    measured, fitted = ((each[1] - each[0])[shown] for each in (fit.stretch.readings, fit.fitted))
     panel.plot(time, 1e3 * measured, color=BLUE, linewidth=0.9, label="measured (first decay)")
     panel.plot(time, 1e3 * fitted, "--", color=VERMILLION, linewidth=0.9, label="fitted")
     below.plot(time, 1e6 * (measured - fitted), color=BLUE, linewidth=0.4)

@@ -133,9 +133,9 @@ def spring_result(label: float, held: FrameResult, reference: Reference) -> Spri
     k1, shared = float(reference.values[0]), held.shared
     shift = held.shared_shift[K1] - reference.shift[0]
     parts = {
-        "decays with the spring": sqrt(max(_apart(held, K1), 0.0)),
+        "decays with the spring": sqrt(max(_own_variance(held, K1), 0.0)),
         "bare frame": sqrt(max(float(reference.apart[0, 0]), 0.0)),
-        "masses": sqrt(max(float(shift[:2] @ held.weighed @ shift[:2]), 0.0)),
+        "masses": sqrt(max(float(shift[:2] @ held.masses_covariance @ shift[:2]), 0.0)),
         "timebase": abs(float(shift[2])),
     }
     across = reference.shift @ shared @ shift - reference.apart[:, 0]
@@ -149,7 +149,7 @@ def spring_result(label: float, held: FrameResult, reference: Reference) -> Spri
     )
     slope = np.array([1.0, -k_c / k1]) / k1
     off = held.shared_shift[K2] - reference.shift[1]
-    k2_variance = _apart(held, K2) + float(reference.apart[1, 1] + off @ shared @ off)
+    k2_variance = _own_variance(held, K2) + float(reference.apart[1, 1] + off @ shared @ off)
     k2_off = float(held.frame.values[K2] - reference.values[1])
     return SpringResult(
         label=label,
@@ -208,7 +208,7 @@ def spring_findings(
         covariances = {other: _with_known(spring, known, other, measured=bare is not None) for other in kept}
         if framed:
             covariances |= dict(zip(spring.reference.names, spring.across, strict=True))
-            weighed = spring.held.weighed @ spring.shift[:2]
+            weighed = spring.held.masses_covariance @ spring.shift[:2]
             covariances |= {mass: value for mass, value in zip(MASSES, weighed, strict=True) if mass in made}
         for other in springs[:place]:
             # both springs share the masses, the timebase, and the bare frame as reference
@@ -233,7 +233,7 @@ def _relative(covariance: Array, values: Array) -> Array:
     return covariance / np.outer(values, values)
 
 
-def _apart(held: FrameResult, place: int) -> float:
+def _own_variance(held: FrameResult, place: int) -> float:
     """Variance of a quantity without the contributions of masses and timebase."""
     shift = held.shared_shift[place]
     return float(held.frame.covariance[place, place] - shift @ held.shared @ shift)

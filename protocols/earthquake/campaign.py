@@ -91,7 +91,7 @@ class EarthquakeCampaign(Prepared[EarthquakeParameters]):
             write_figure(path, gain_figure(points, arrays(self.prediction)))
 
         def motions(path: Path) -> None:
-            asked = kept.asked.items()
+            asked = kept.requested.items()
             write_figure(path, motion_figure([MotionPicture(name, STEP, a, kept.achieved[name]) for name, a in asked]))
 
         def drifts(path: Path) -> None:

@@ -139,7 +139,7 @@ def combinations(
     found, done = list[Combination](), counting(progress, f"simulating every record with {1 + DRAWS} specimens")
     for shaking in shakings:
         for specimen in specimens:
-            found.append(Combination(shaking.name, specimen.label, _asked(shaking, specimen, configuration)))
+            found.append(Combination(shaking.name, specimen.label, _shaking_demands(shaking, specimen, configuration)))
             done(len(found), len(shakings) * len(specimens))
     return found
 
@@ -200,11 +200,11 @@ def _identification(table: TableSource) -> list[StageDemands]:
     if table.plan is None:
         return []
     # the specimen's uncertainty is neglected, since the response is linear and the level includes a margin
-    values = {quantity: np.full(1 + DRAWS, value) for quantity, value in table.plan.asked.items()}
+    values = {quantity: np.full(1 + DRAWS, value) for quantity, value in table.plan.demands.items()}
     return [StageDemands("the identification of the table", values, None)]
 
 
-def _asked(shaking: Shaking, specimen: Specimen, configuration: BenchConfiguration) -> StageDemands:
+def _shaking_demands(shaking: Shaking, specimen: Specimen, configuration: BenchConfiguration) -> StageDemands:
     loads = load(shaking, specimen.mass, configuration, response_of(configuration))
     raised = _RAISED if specimen.beta is not None else ()
     factors = np.concatenate(([1.0], 1.0 + OFF * np.random.default_rng(SEED).uniform(-1.0, 1.0, DRAWS)))

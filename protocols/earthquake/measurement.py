@@ -252,7 +252,7 @@ class Histories:
     ratio (None for the bare frame).
     """
 
-    asked: dict[str, Array] = field(default_factory=dict[str, Array])
+    requested: dict[str, Array] = field(default_factory=dict[str, Array])
     achieved: dict[str, Array] = field(default_factory=dict[str, Array])
     drifts: dict[tuple[str, float | None], DriftHistory] = field(
         default_factory=dict[tuple[str, float | None], DriftHistory]
@@ -260,7 +260,7 @@ class Histories:
 
     def bare(self, shaking: Shaking, signals: Array, predicted: Array) -> None:
         every = _every(shaking)
-        self.asked[shaking.name] = shaking.target.acceleration[::every]
+        self.requested[shaking.name] = shaking.target.acceleration[::every]
         self.achieved[shaking.name] = signals[: shaking.target.acceleration.size : every, ACCELERATION]
         self.drifts[shaking.name, None] = DriftHistory(signals[::every, DRIFT], predicted)
 

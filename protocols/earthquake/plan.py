@@ -88,7 +88,7 @@ class Pace:
         """Count one play of a record: a pass, or a test with a spring."""
         self._played[record] += 1
 
-    def learned(self, record: str) -> None:
+    def finish_replication(self, record: str) -> None:
         """Finish the bare-frame part of a record; unused passes count as completed."""
         self._played[record] = self._bare[record]
 
@@ -128,7 +128,7 @@ class EarthquakePlan:
                 self._bare[shaking.name] = f"{OMITTED}: {omitted}"
                 continue
             self._bare[shaking.name] = yield from self._bare_frame(shaking, model)
-            self._pace.learned(shaking.name)
+            self._pace.finish_replication(shaking.name)
             yield Publish(self._pace.progress(f"{shaking.name} finished, bare frame"))
         for beta in self._parameters.beta:
             yield from self._spring(self._specimen.coupled(beta))
@@ -142,22 +142,22 @@ class EarthquakePlan:
             return self._pace.progress(f"replicating {shaking.name}")
 
         try:
-            learned = yield from replicate(shaking.target, model, limits, self._learning(), shaking.name, passed)
+            replication = yield from replicate(shaking.target, model, limits, self._learning(), shaking.name, passed)
         except InvalidInput as beyond:
             # the campaign continues with the other records
             yield Publish(Warned(f"{shaking.name} is not played: {beyond}"))
             return f"the table cannot reproduce it: {beyond}"
-        if learned.fell:
+        if replication.fell:
             raise RigError(NO_BLOCK)
-        if (reason := rejection(learned, p)) is not None:
+        if (reason := rejection(replication, p)) is not None:
             yield Publish(Warned(f"{shaking.name} is not played: {reason}"))
             return reason
-        if lacking := shortfall(learned, p, shaking.target.band[0]):
+        if lacking := shortfall(replication, p, shaking.target.band[0]):
             self._shortfalls[shaking.name] = lacking
             yield Publish(Warned(f"{shaking.name} is played with the best drive so far: {lacking}"))
         yield Publish(StepStarted(f"{shaking.name}, bare frame"))
         monitor = GainMonitor(shaking.name, None, shaking.target.sample_rate)
-        outcome = yield from self._play(shaking, learned.drive, monitor)
+        outcome = yield from self._play(shaking, replication.drive, monitor)
         if not isinstance(outcome, Played):
             raise RigError(NO_BLOCK)
         rate = shaking.target.sample_rate
@@ -168,9 +168,9 @@ class EarthquakePlan:
             return f"the bare frame has no measurable peak: {lost}"
         self._histories.bare(shaking, outcome.signals, History.of(self._specimen.bare(), observed.base).drift)
         return BareTest(
-            learned.drive,
-            learned.passes,
-            learned.status,
+            replication.drive,
+            replication.passes,
+            replication.status,
             observed,
             outcome.signals,
             tracking(shaking, outcome.signals),

@@ -106,11 +106,11 @@ def compare(
         )
 
     everything = predicted(configuration.known, n, sensors.table_scale, True, of_all)
-    stood = _stood(everything.alpha_2 * measured_2)
+    stood = _standing(everything.alpha_2 * measured_2)
     known = predicted(NONE, n // 2, sensors.table_scale, True, of_bench)
-    off = np.abs(_stood(known.alpha_2 * measured_2[: n // 2]) - known.nominal[1])
+    off = np.abs(_standing(known.alpha_2 * measured_2[: n // 2]) - known.nominal[1])
     low, high = _interval(stood)
-    low_1, high_1 = _interval(_stood(everything.alpha_1 * measured_1))
+    low_1, high_1 = _interval(_standing(everything.alpha_1 * measured_1))
     parts = {name: alpha_2 * float(_ratio(each).std()) for name, each in errors.items()}
     parts |= _parts(predicted, configuration.known, n // 4, sensors.table_scale, of_parts)
     apart = sum(value**2 for value in parts.values())
@@ -155,7 +155,7 @@ def _ratio(errors: Array) -> Array:
     return (1.0 + errors[1]) / (1.0 + errors[0])
 
 
-def _stood(gains: Array) -> Array:
+def _standing(gains: Array) -> Array:
     """Gains of the draws in which the block does not topple."""
     return gains[np.isfinite(gains)]
 

@@ -123,7 +123,7 @@ def _pair(value: float, uncertainty: float) -> tuple[str, str]:
 
 
 def _motion(motion: "Axes", left: "Axes", tilt: Tilt) -> None:
-    seen, fit, zero = tilt.seen, tilt.fit, tilt.fit.values[ZERO]
+    seen, fit, zero = tilt.recording, tilt.fit, tilt.fit.values[ZERO]
     end = float(fit.times[-1]) + 1.0
     shown = slice(None, int(end * seen.sample_rate), max(round(seen.sample_rate / 500.0), 1))
     motion.plot(seen.times[shown], 1e3 * (seen.displacement[shown] - zero), color=BLACK, lw=0.9, label="measured")

@@ -89,7 +89,7 @@ class FreeVibration(Prepared[FreeVibrationParameters]):
     def forecast(self) -> Forecast:
         self.progress("predicting the demands of the run")
         if self._pulse is None:
-            return _hand_forecast(self.configuration, self.parameters.pull, self._duration)
+            return _release_forecast(self.configuration, self.parameters.pull, self._duration)
         return pulse_forecast(self.configuration, {"bare frame": self._pulse}, self._duration)
 
     @cached_property
@@ -115,7 +115,7 @@ class FreeVibration(Prepared[FreeVibrationParameters]):
             decays = yield from self._locked_decays(specimen, setting, pace)
         else:
             decays = yield from pulsed_decays(p, self.configuration, self._pulse, setting, pace, "free vibration")
-        found = self._frame = frame_result(decays, setting.masses, setting.weighed)
+        found = self._frame = frame_result(decays, setting.masses, setting.masses_covariance)
         if found.nonlinear.any():
             yield Publish(Warned(nonlinear_text(found)))
         yield Publish(PointFinished(decay_point(found, 0)))
@@ -170,7 +170,7 @@ def _check_pull(parameters: FreeVibrationParameters, configuration: BenchConfigu
         raise InvalidInput("pull", parameters.pull, allowed)
 
 
-def _hand_forecast(configuration: BenchConfiguration, pull: float, duration: float) -> Forecast:
+def _release_forecast(configuration: BenchConfiguration, pull: float, duration: float) -> Forecast:
     """Demands of releases by hand. There is no drive, and the storeys swing to either side by at most the initial
     displacement of storey 2.
     """

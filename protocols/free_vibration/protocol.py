@@ -19,7 +19,7 @@ class FreeVibrationParameters(DecayParameters):
     pull: float = quantity(0.020, "m", "displacement of storey 2 before the release by hand", gt=0, le=0.2)
 
     @model_validator(mode="after")
-    def _hands_make_no_pulse_and_pulses_do_not_pull(self) -> "FreeVibrationParameters":
+    def _check_excitation(self) -> "FreeVibrationParameters":
         others = {"hand": ("drift", "pulse"), "pulse": ("pull",)}
         for item in others[self.excitation]:
             value, default = getattr(self, item), FreeVibrationParameters.model_fields[item].default

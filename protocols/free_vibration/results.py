@@ -108,7 +108,7 @@ def _notes(point: DecayPoint, result: FrameResult) -> list[str]:
 def _draw_decay(decay: "Axes", rest: "Axes", result: FrameResult) -> None:
     fit = result.decays[0].fit
     time = fit.stretch.time
-    drift = 1e3 * (fit.stretch.seen[1] - fit.stretch.seen[0])
+    drift = 1e3 * (fit.stretch.readings[1] - fit.stretch.readings[0])
     decay.plot(time, drift, color=BLUE, linewidth=0.9, label="measured (first decay)")
     decay.plot(time, 1e3 * (fit.fitted[1] - fit.fitted[0]), "--", color=VERMILLION, linewidth=0.9, label="fitted")
     decay.axvline(result.decays[0].begin, color=GREY, linewidth=0.8)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.config.model import BenchConfiguration
-from bench.control.oscillator import Leg, program
+from bench.control.oscillator import Segment, program
 from bench.control.starts import CATCH_ANGLE, DRIVE, SEED, Start
 from bench.preflight.demands import (
     UNKNOWN_SHAKER,
@@ -53,7 +53,7 @@ class Trial:
 
     stage: Stage
     specimen: Specimen
-    before: tuple[Leg, ...] = ()
+    before: tuple[Segment, ...] = ()
     hold: float = 0.0
     longest: float = 0.0
     beta: float | None = None
@@ -61,15 +61,15 @@ class Trial:
     control: float = 0.0
 
     @property
-    def legs(self) -> tuple[Leg, ...]:
+    def segments(self) -> tuple[Segment, ...]:
         """All simulated segments."""
-        legs = (*self.before, *self.stage.legs)
-        return (*legs, replace(legs[-1], duration=self.hold)) if self.hold > 0.0 else legs
+        segments = (*self.before, *self.stage.segments)
+        return (*segments, replace(segments[-1], duration=self.hold)) if self.hold > 0.0 else segments
 
     @property
     def begin(self) -> float:
         """Start of the evaluation [s]."""
-        return sum(leg.duration for leg in self.before)
+        return sum(segment.duration for segment in self.before)
 
 
 def trials(
@@ -90,8 +90,8 @@ def trials(
         coupled = specimen.coupled(beta)
         plans = {omega: starts[beta, omega] for omega in parameters.omega}
         wanted, level = spring_calibration(parameters, coupled, [start for each in plans.values() for start in each])
-        legs = _calibration_legs([(omega, level) for omega in wanted])
-        yield Trial(Stage(f"calibration of the drive with beta = {beta:g}", legs), coupled)
+        segments = _calibration_segments([(omega, level) for omega in wanted])
+        yield Trial(Stage(f"calibration of the drive with beta = {beta:g}", segments), coupled)
         for omega, planned in plans.items():
             possible = parameters.hold and too_late(configuration, omega) is None
             held = possible and _slow(parameters, coupled, omega)
@@ -99,7 +99,7 @@ def trials(
             control = parameters.hold_authority if held else 0.0
             for number, start in enumerate(planned, 1):
                 name = f"start {number} of beta = {beta:g} at omega = {omega:g} rad/s"
-                stage = Stage(name, start.legs, start.chance)
+                stage = Stage(name, start.segments, start.chance)
                 yield Trial(stage, coupled, (), HOLD, longest + extra, beta, omega, control)
 
 
@@ -121,42 +121,42 @@ def _bare_calibration(parameters: HarmonicParameters, specimen: Specimen, respon
     level = parameters.calibration_level * parameters.amplitude_factor * specimen.uplift_acceleration
     first = parameters.omega[0]
     wanted = sorted({*parameters.omega, *harmonic_frequencies(max(parameters.omega), parameters.harmonics)})
-    legs: list[Leg] = []
+    segments: list[Segment] = []
     if response is None:
         levels = [(omega, level) for omega in wanted]
     else:
         gains = response.gain(np.array([first, *wanted]), specimen.bare().mass)
         for volts in PROBES:
-            legs += [*_measured(first, volts * float(gains[0])), Leg(CHANGE_TIME, 0.0, first)]
+            segments += [*_measured(first, volts * float(gains[0])), Segment(CHANGE_TIME, 0.0, first)]
         probed = gains[0] * (1.0 - response.friction / PROBES[-1])
         before = [probed, *gains[1:-1]]
         levels = [(w, level * float(gain / by)) for w, gain, by in zip(wanted, gains[1:], before, strict=True)]
     for omega, moved in levels:
-        legs += [*_measured(omega, moved), Leg(CHANGE_TIME, 0.0, omega)]
-    legs.append(Leg(CHANGE_TIME, 0.0, wanted[-1]))
-    return Trial(Stage("calibration of the drive with the bare frame", tuple(legs)), specimen.bare())
+        segments += [*_measured(omega, moved), Segment(CHANGE_TIME, 0.0, omega)]
+    segments.append(Segment(CHANGE_TIME, 0.0, wanted[-1]))
+    return Trial(Stage("calibration of the drive with the bare frame", tuple(segments)), specimen.bare())
 
 
 def _bare_tests(parameters: HarmonicParameters, specimen: Specimen) -> Iterator[Trial]:
     amplitude = parameters.amplitude_factor * specimen.uplift_acceleration
-    before: tuple[Leg, ...] = ()
+    before: tuple[Segment, ...] = ()
     for omega in parameters.omega:
-        leg = Leg(BARE_CHANGE if before else parameters.ramp_time, amplitude, omega)
-        stage = Stage(f"the bare frame at omega = {omega:g} rad/s", (leg,))
+        segment = Segment(BARE_CHANGE if before else parameters.ramp_time, amplitude, omega)
+        stage = Stage(f"the bare frame at omega = {omega:g} rad/s", (segment,))
         longest = _longest_dwell(parameters)
         yield Trial(stage, specimen.bare(), before, hold=BARE_HOLD, longest=longest, steady=omega)
         # the next stage starts from this motion, which is as steady after `hold` seconds as the damping allows
-        before = (Leg(parameters.ramp_time, amplitude, omega), replace(leg, duration=BARE_HOLD))
+        before = (Segment(parameters.ramp_time, amplitude, omega), replace(segment, duration=BARE_HOLD))
 
 
-def _calibration_legs(levels: Sequence[tuple[float, float]]) -> tuple[Leg, ...]:
+def _calibration_segments(levels: Sequence[tuple[float, float]]) -> tuple[Segment, ...]:
     """Segments of a calibration through all pairs of frequency [rad/s] and level [m/s2], ending at zero level."""
-    legs = [leg for omega, level in levels for leg in _measured(omega, level)]
-    return (*legs, Leg(CHANGE_TIME, 0.0, levels[-1][0]))
+    segments = [segment for omega, level in levels for segment in _measured(omega, level)]
+    return (*segments, Segment(CHANGE_TIME, 0.0, levels[-1][0]))
 
 
-def _measured(omega: float, level: float) -> tuple[Leg, Leg]:
-    return Leg(CHANGE_TIME, level, omega), Leg((SETTLING + MEASURED) * tau / omega, level, omega)
+def _measured(omega: float, level: float) -> tuple[Segment, Segment]:
+    return Segment(CHANGE_TIME, level, omega), Segment((SETTLING + MEASURED) * tau / omega, level, omega)
 
 
 def _longest_dwell(parameters: HarmonicParameters) -> float:
@@ -210,7 +210,7 @@ def forecast(
     simulating = counting(progress, f"simulating every stage with {1 + DRAWS} specimens")
     moved = _travels(found, factors, configuration, simulating)
     asked = [
-        _asked(
+        _trial_demands(
             trial,
             travels,
             None if trial.steady is None else steady(trial.beta, trial.steady),
@@ -241,19 +241,22 @@ def _travels(
 
     def one(trial: Trial) -> list[Travel]:
         def simulated() -> list[list[float]]:
-            programs = [program(legs) for legs in driven]
+            programs = [program(segments) for segments in driven]
             moved = stage_travels(drawn[trial.specimen], programs, trial.begin, reference, CATCH_ANGLE)
             return [[*astuple(each)] for each in moved]
 
-        driven = [[replace(leg, amplitude=float(factor) * leg.amplitude) for leg in trial.legs] for factor in factors]
-        legs = [[astuple(leg) for leg in each] for each in driven]
-        inputs = [models[trial.specimen], legs, trial.begin, reference, CATCH_ANGLE]
+        driven = [
+            [replace(segment, amplitude=float(factor) * segment.amplitude) for segment in trial.segments]
+            for factor in factors
+        ]
+        segments = [[astuple(segment) for segment in each] for each in driven]
+        inputs = [models[trial.specimen], segments, trial.begin, reference, CATCH_ANGLE]
         return [Travel(*each) for each in cached("travel", inputs, simulated)]
 
     return in_threads(one, found, done)
 
 
-def _asked(
+def _trial_demands(
     trial: Trial,
     travels: Sequence[Travel],
     steady: Travel | None,
@@ -262,7 +265,7 @@ def _asked(
     response: TableResponse | None,
 ) -> StageDemands:
     loads = load(
-        program(trial.legs),
+        program(trial.segments),
         trial.begin,
         trial.longest,
         payload=trial.specimen.mass,

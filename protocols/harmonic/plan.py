@@ -16,7 +16,7 @@ from bench.analysis.gain import steady_peak
 from bench.analysis.running_gain import RunningGain, shared_draws
 from bench.analysis.sensor_accuracy import SensorUncertainty
 from bench.config.model import BenchConfiguration
-from bench.control.oscillator import DriveCalibration, Leg
+from bench.control.oscillator import DriveCalibration, Segment
 from bench.control.sine import Sine
 from bench.control.stabiliser import GROWTH, StabiliserDesign
 from bench.control.starts import Start
@@ -87,7 +87,7 @@ class HarmonicPlan:
         duration = self._parameters.ramp_time
         for omega in self._parameters.omega:
             yield Publish(StepStarted(f"bare frame at {omega:g} rad/s"))
-            yield Sweep((Leg(duration, self._amplitude, omega),))
+            yield Sweep((Segment(duration, self._amplitude, omega),))
             settled = yield from self._settle(omega, None, calibration)
             if isinstance(settled, Fallen):
                 raise RigError(NO_BLOCK)
@@ -143,7 +143,7 @@ class HarmonicPlan:
             yield Arm(REST)
             yield Calibrate(calibration)
             settled: Settled | Fallen | None = None
-            if not isinstance((yield Sweep(start.legs)), Fallen):
+            if not isinstance((yield Sweep(start.segments)), Fallen):
                 settled = yield from self._settle(omega, specimen, calibration)
             held: Held | Fallen | None = None
             if isinstance(settled, Settled) and held_by is not None and _to_be_held(settled, held_by):
@@ -293,7 +293,7 @@ def spring_calibration(
 ) -> tuple[list[float], float]:
     """Frequencies [rad/s] and level [m/s2] of the drive calibration with a spring, which leaves the block at rest."""
     amplitude = parameters.amplitude_factor * specimen.uplift_acceleration
-    omegas = sorted({leg.omega for start in starts for leg in start.legs})
+    omegas = sorted({segment.omega for start in starts for segment in start.segments})
     grid = np.linspace(omegas[0], omegas[-1], max(round((omegas[-1] - omegas[0]) / 1.5) + 1, 2))
     wanted = sorted({*(round(float(omega), 2) for omega in grid), *parameters.omega})
     allowed = 0.6 * min(resting_level(specimen, omega) for omega in wanted)

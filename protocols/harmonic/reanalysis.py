@@ -95,9 +95,9 @@ class HarmonicFollower:
             case Dwell() if self._last is not None:
                 if step.phase is not None or self._series is None:
                     free = self._series
-                    leg = self._last.legs[-1]
-                    sine = Sine(leg.omega, leg.amplitude, self._calibration)
-                    analyser = CycleAnalyser(leg.omega, self._rate, self._read, self._settings.harmonics)
+                    segment = self._last.segments[-1]
+                    sine = Sine(segment.omega, segment.amplitude, self._calibration)
+                    analyser = CycleAnalyser(segment.omega, self._rate, self._read, self._settings.harmonics)
                     self._series = _Series(sine, analyser)
                     if free is not None:
                         self._end_series(free)

@@ -48,7 +48,7 @@ class Identification(Prepared[IdentifyParameters]):
         self.progress("predicting the demands of the run")
         found = self._found
         where = f"a multisine of {found.level:.3g} m/s2"
-        demands = demands_of(found.asked, where, self.configuration)
+        demands = demands_of(found.demands, where, self.configuration)
         return Forecast(demands=demands, duration=expected_duration(self.parameters, found))
 
     @cached_property

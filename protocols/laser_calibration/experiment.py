@@ -12,7 +12,7 @@ from bench.analysis.laser_calibration import LaserCalibration
 from bench.analysis.uncertainty import COVERAGE
 from bench.config.model import BenchConfiguration
 from bench.config.result_files import write_calibration
-from bench.control.oscillator import Leg, program
+from bench.control.oscillator import Segment, program
 from bench.datafile.tables import Column, Table
 from bench.engine.steps import OperatorAction, Outcome, Publish, Step
 from bench.events import PointFinished
@@ -101,7 +101,7 @@ class LaserCalibrationRun(Prepared[LaserCalibrationParameters]):
         duration = expected_duration(self.parameters)
         level = amplitude * omega**2
         asked = load(
-            program((Leg(START, level, omega), Leg(duration, level, omega))),
+            program((Segment(START, level, omega), Segment(duration, level, omega))),
             START,
             duration,
             payload=self.configuration.known_specimen.bare().mass,

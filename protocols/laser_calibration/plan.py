@@ -8,7 +8,7 @@ import numpy as np
 
 from bench.analysis.laser_calibration import LaserCalibration
 from bench.config.model import BenchConfiguration
-from bench.control.oscillator import DriveCalibration, Leg
+from bench.control.oscillator import DriveCalibration, Segment
 from bench.engine.steps import (
     AcquireAtRest,
     Arm,
@@ -77,10 +77,10 @@ def measure(
 ) -> Generator[Step, Outcome, tuple[LaserCalibration, tuple[ErrorCurve, ErrorCurve]]]:
     """Steps of the measurement with the clamped frame; returns the calibration and the error curves of the lasers."""
     yield Publish(StepStarted("acquire the lasers at rest"))
-    heard = yield AcquireAtRest(REST)
-    if not isinstance(heard, RestSamples):
-        raise TypeError(f"the acquisition at rest ended with {heard}")
-    rests = _rests(heard)
+    at_rest = yield AcquireAtRest(REST)
+    if not isinstance(at_rest, RestSamples):
+        raise TypeError(f"the acquisition at rest ended with {at_rest}")
+    rests = _rest_readings(at_rest)
     yield Arm(REST)
     try:
         passes = yield from _passes(parameters)
@@ -89,7 +89,7 @@ def measure(
         raise
     yield RampOut()
     curves = fit_curve(passes, 0, rests[0]), fit_curve(passes, 1, rests[1])
-    devices = {channel.name: channel.device for channel in heard.channels}
+    devices = {channel.name: channel.device for channel in at_rest.channels}
     found = calibration(
         passes,
         curves,
@@ -123,11 +123,11 @@ def _passes(parameters: LaserCalibrationParameters) -> Generator[Step, Outcome, 
         yield Publish(StepStarted(text))
         yield Publish(_progress(parameters, number - 1, text))
         if passes and passes[-1].omega == omega:
-            yield Sweep((Leg(CHANGE, amplitude * omega**2, omega),))
+            yield Sweep((Segment(CHANGE, amplitude * omega**2, omega),))
         else:
             if passes:
-                yield Sweep((Leg(START, 0.0, passes[-1].omega),))
-            yield Sweep((Leg(START, amplitude * omega**2, omega),))
+                yield Sweep((Segment(START, 0.0, passes[-1].omega),))
+            yield Sweep((Segment(START, amplitude * omega**2, omega),))
         outcome = yield Dwell(SETTLING + parameters.cycles)
         if not isinstance(outcome, Measured):
             raise Unmeasurable(_LOOSE)
@@ -144,12 +144,12 @@ def _progress(parameters: LaserCalibrationParameters, finished: int, activity: s
     return Progress(1.0 - left / expected_duration(parameters), left, activity)
 
 
-def _rests(heard: RestSamples) -> tuple[float, float]:
+def _rest_readings(samples: RestSamples) -> tuple[float, float]:
     """Readings of both lasers at rest [m]. Raises Unmeasurable if a laser has no valid reading."""
     found: list[float] = []
     for name in STOREYS:
-        column, channel = next((k, each) for k, each in enumerate(heard.channels) if each.name == name)
-        values = channel.to_unit(heard.counts[:, column])
+        column, channel = next((k, each) for k, each in enumerate(samples.channels) if each.name == name)
+        values = channel.to_unit(samples.counts[:, column])
         if not np.isfinite(values).any():
             raise Unmeasurable(
                 f"{name} has no valid reading at rest: check that it is on and that its storey is within its range"

@@ -28,7 +28,7 @@ from bench.analysis.laser_calibration import LaserCalibration
 from bench.analysis.linearity import LinearFrame
 from bench.analysis.sensor_accuracy import SensorUncertainty
 from bench.analysis.steady import Steadiness, SteadyDetector
-from bench.analysis.table_motion import at_rest_in_the_end, table_motion
+from bench.analysis.table_motion import table_motion, with_final_rest
 from bench.config.model import BenchConfiguration
 from protocols.earthquake.measurement import observe
 from protocols.earthquake.uncertainty import drift_errors
@@ -224,7 +224,7 @@ def table_record(acceleration: Array, dt: float) -> Array:
 
     high = signal.butter(4, LOWEST, "highpass", fs=1.0 / dt, output="sos")
     quiet = np.zeros(round(2.0 / dt))
-    return at_rest_in_the_end(signal.sosfiltfilt(high, np.concatenate((quiet, acceleration, quiet))), dt)
+    return with_final_rest(signal.sosfiltfilt(high, np.concatenate((quiet, acceleration, quiet))), dt)
 
 
 def seismic(trials: int, name: str) -> None:

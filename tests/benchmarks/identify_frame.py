@@ -65,13 +65,15 @@ def trial(seed: int, decays: int, excitation: str) -> Trial:
     specimen = Specimen(frame=frame)
     bench = VirtualBench(parameters, specimen, seed)
     recorded = partial(_released if excitation == "hand" else _pulsed, bench)
-    bare = frame_result([recorded(Arrangement(specimen)) for _ in range(decays)], setting.masses, setting.weighed)
+    bare = frame_result(
+        [recorded(Arrangement(specimen)) for _ in range(decays)], setting.masses, setting.masses_covariance
+    )
     errors, stated = bare.frame.values - truth, bare.uncertainty
     if excitation == "pulse":
         held = Arrangement(specimen.with_spring(k_c), block_clamped=True)
         spring = spring_result(
             0.25,
-            frame_result([recorded(held) for _ in range(decays)], setting.masses, setting.weighed),
+            frame_result([recorded(held) for _ in range(decays)], setting.masses, setting.masses_covariance),
             measured_reference(bare),
         )
         errors, stated = np.append(errors, spring.k_c - k_c), np.append(stated, spring.uncertainty)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from bench.analysis.signals import SignalMap
-from bench.control.oscillator import Leg
+from bench.control.oscillator import Segment
 from bench.datafile.recorder import PATIENCE, Recorder
 from bench.engine.engine import Engine
 from bench.engine.interface import Ending, EventStream, Requests
@@ -111,7 +111,7 @@ class FaultyBench:
                 OperatorAction(work, specimen, work.value),
                 Arm(of.rest, patience=2.0 * of.rest),
                 Calibrate(of.calibration),
-                Sweep((Leg(of.glide, of.amplitude, of.omega),)),
+                Sweep((Segment(of.glide, of.amplitude, of.omega),)),
                 *dwells,
                 RampOut(fast=fast),
             ]

@@ -4,7 +4,7 @@ import errno
 from functools import partial
 from threading import Thread
 
-from bench.control.oscillator import DriveCalibration, Leg
+from bench.control.oscillator import DriveCalibration, Segment
 from bench.engine.steps import Calibrate, SetHarmonics, Step, Sweep
 from sim.errors import RockbenchError
 from tests.faults.bench import Begin, FaultyBench
@@ -27,7 +27,7 @@ def plans() -> list[Fault]:
         "nan": SetHarmonics((complex("nan"),)),
         "over-range": Calibrate(DriveCalibration.flat(GAIN / 10.0)),
         # 1.6 V and more at 500 rad/s change by 800 V/s and more
-        "slewing": Sweep((Leg(0.02, 4.0, 500.0),)),
+        "slewing": Sweep((Segment(0.02, 4.0, 500.0),)),
     }
     return [
         *(_strikes(f"{name} drive", _does(step), "aborted", "drive") for name, step in bad.items()),

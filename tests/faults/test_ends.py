@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from bench.app.session import SessionResult
-from bench.control.oscillator import Leg
+from bench.control.oscillator import Segment
 from bench.engine.interface import Requests
 from bench.engine.steps import Arm, Calibrate, Dwell, OperatorAction, Plan, RampOut, Sweep
 from drivers.rig import OperatorTask
@@ -59,7 +59,7 @@ def test_clocks_that_drift_apart_end_a_long_run() -> None:
         yield OperatorAction(OperatorTask.MOUNT_SPRING, COUPLED, "mount the spring")
         yield Arm(0.2)
         yield Calibrate(CALIBRATION)
-        yield Sweep((Leg(0.25, AMPLITUDE, OMEGA),))
+        yield Sweep((Segment(0.25, AMPLITUDE, OMEGA),))
         yield Dwell(120)
         yield RampOut()
 

@@ -14,7 +14,7 @@ from bench.app.cli.main import main
 from bench.config import backend as backends
 from bench.config.backend import RigBackend
 from bench.config.model import BenchConfiguration
-from bench.control.oscillator import DriveCalibration, Leg
+from bench.control.oscillator import DriveCalibration, Segment
 from bench.datafile.inspection import verify
 from bench.datafile.reader import open_datafile
 from bench.engine.steps import Arm, Calibrate, Dwell, OperatorAction, RampOut, Sweep
@@ -95,7 +95,7 @@ def test_a_lie_ends_the_run_with_the_backend_named(lie: Lie) -> None:
         OperatorAction(OperatorTask.MOUNT_SPRING, Specimen().coupled(0.4), "a spring"),
         Arm(0.5),
         Calibrate(DriveCalibration.flat(1.0)),
-        Sweep((Leg(0.5, 0.5, 16.0),)),
+        Sweep((Segment(0.5, 0.5, 16.0),)),
         Dwell(2),
         RampOut(fast=False),
     )

@@ -6,7 +6,7 @@ import sys
 import numpy as np
 import pytest
 
-from bench.control.oscillator import DriveCalibration, Leg
+from bench.control.oscillator import DriveCalibration, Segment
 from bench.engine.steps import Arm, Calibrate, Dwell, Plan, Publish, RampOut, Sweep
 from bench.events import Event, Progress, State
 from bench.testing.loopback import LoopbackBench
@@ -18,7 +18,7 @@ OMEGA = 16.0
 def _driven() -> Plan:
     yield Arm(0.5)
     yield Calibrate(DriveCalibration.flat(1.0))
-    yield Sweep((Leg(1.0, 0.5, OMEGA),))
+    yield Sweep((Segment(1.0, 0.5, OMEGA),))
 
 
 def _check(bench: LoopbackBench, ending: object) -> None:
@@ -98,7 +98,7 @@ def test_memory_that_ends_between_the_rig_and_the_guard_is_ramped_out_without_a_
 
 _HOG = """
 import resource
-from bench.control.oscillator import DriveCalibration, Leg
+from bench.control.oscillator import DriveCalibration, Segment
 from bench.engine.steps import Arm, Calibrate, Dwell, Sweep
 from bench.events import Acquired, State
 from bench.testing.loopback import LoopbackBench
@@ -110,7 +110,7 @@ bench = LoopbackBench(subscriber=subscriber)
 def plan():
     yield Arm(0.5)
     yield Calibrate(DriveCalibration.flat(1.0))
-    yield Sweep((Leg(1.0, 3.0, 16.0),))
+    yield Sweep((Segment(1.0, 3.0, 16.0),))
     with open("/proc/self/statm") as now:
         used = int(now.read().split()[0]) * resource.getpagesize()
     resource.setrlimit(resource.RLIMIT_AS, (used + 2**26, resource.RLIM_INFINITY))

@@ -8,7 +8,7 @@ from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
-from bench.control.oscillator import Leg
+from bench.control.oscillator import Segment
 from bench.engine.steps import Arm, Calibrate, Dwell, OperatorAction, Outcome, Plan, RampOut, SetHarmonics, Step, Sweep
 from bench.events import State
 from drivers.rig import OperatorTask
@@ -67,7 +67,7 @@ class Orders(RuleBasedStateMachine):
     @precondition(lambda self: self.state is State.RUNNING)
     @rule(amplitude=st.sampled_from([0.0, 0.4, 1.0]), omega=st.sampled_from([20.0, 25.0, 40.0]))
     def follow(self, amplitude: float, omega: float) -> None:
-        self._do(Sweep((Leg(0.3, amplitude, omega),)))
+        self._do(Sweep((Segment(0.3, amplitude, omega),)))
 
     @precondition(lambda self: self.state is State.RUNNING)
     @rule(cycles=st.integers(1, 3))

@@ -171,7 +171,7 @@ def _noise(fit: Fit) -> Array:
         frequency, density = np.asarray(found[0], np.float64), np.asarray(found[1], np.float64)
         turned = np.fft.rfft(jacobian)
         # half the one-sided density is the variance of the equivalent white noise
-        left = _left_alone(frequency, fit)
+        left = _noise_passes(frequency, fit)
         power = np.interp(np.fft.rfftfreq(n), frequency[left], density[left] / 2.0)
         twice = np.full(power.size, 2.0)
         twice[0] = 1.0
@@ -179,7 +179,7 @@ def _noise(fit: Fit) -> Array:
     return fit.inverse @ scores @ fit.inverse
 
 
-def _left_alone(frequency: Array, fit: Fit) -> NDArray[np.bool_]:
+def _noise_passes(frequency: Array, fit: Fit) -> NDArray[np.bool_]:
     """Mask of the frequencies (in cycles per sample) at which the fit absorbs no noise: those away from the modes and
     from zero.
     """

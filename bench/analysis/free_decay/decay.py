@@ -30,7 +30,8 @@ _SLIPPED = 0.1
 @dataclass(frozen=True, eq=False)
 class Setting:
     """Known conditions of a recording: `sample_rate` [1/s], the lasers' `ranges` [m] and whether they are fixed to the
-    table (`on_table`), their `accuracy`, the `masses` (m1, m2) [kg] and their covariance `weighed` [kg2], shape (2, 2).
+    table (`on_table`), their `accuracy`, the `masses` (m1, m2) [kg] and their covariance `masses_covariance` [kg2],
+    shape (2, 2).
     """
 
     sample_rate: float
@@ -38,7 +39,7 @@ class Setting:
     on_table: bool
     accuracy: SensorAccuracy
     masses: tuple[float, float]
-    weighed: Array
+    masses_covariance: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +82,7 @@ def released_decay(signals: Array, setting: Setting) -> Decay:
 
 def _decay(stretch: Stretch, setting: Setting, quiet: float, begin: float) -> Decay:
     fit = fit_from_scratch(stretch, setting.masses)
-    errors = Errors(setting.accuracy, setting.ranges, quiet, setting.weighed)
+    errors = Errors(setting.accuracy, setting.ranges, quiet, setting.masses_covariance)
     found = quantities(fit.constants)
     ratios, omegas = found[XI1 : XI1 + 2], found[OMEGA1 : OMEGA1 + 2]
     return Decay(
@@ -90,7 +91,7 @@ def _decay(stretch: Stretch, setting: Setting, quiet: float, begin: float) -> De
         fit=fit,
         courses=damping_courses(fit, errors, begin, ratios, omegas),
         begin=begin,
-        peak=float(np.nanmax(np.abs(stretch.seen[1] - stretch.seen[0]))),
+        peak=float(np.nanmax(np.abs(stretch.readings[1] - stretch.readings[0]))),
     )
 
 
@@ -98,9 +99,9 @@ def _released(stretch: Stretch) -> float:
     """Time [s] at which storey 2 is released: it has then moved by a fraction of its later motion. Raises Unusable if
     there was no release.
     """
-    seen = stretch.seen[1] - np.nanmedian(stretch.seen[1][stretch.time < _HELD])
+    seen = stretch.readings[1] - np.nanmedian(stretch.readings[1][stretch.time < _HELD])
     moved = np.nan_to_num(np.abs(seen))
-    if moved.max() < 10.0 * np.nanstd(stretch.seen[1][stretch.time < _HELD]):
+    if moved.max() < 10.0 * np.nanstd(stretch.readings[1][stretch.time < _HELD]):
         raise Unusable("the frame was not released during the recording: release it earlier, or record for longer")
     return float(stretch.time[np.argmax(moved > _SLIPPED * moved.max())])
 

@@ -44,9 +44,9 @@ class Shown:
         # a common delay is equivalent to a delay of the table's motion, since the initial state is free
         late, rate = self.stretch.driving(float(values[DELAYS][0]))
         q = found.forced(late) + (found.adjoint @ values[STATE])[:, None] * found.free(late.size)
-        return found, self._seen(found.storeys(q), late), self._seen(found.velocities(q, late), rate)
+        return found, self._relative(found.storeys(q), late), self._relative(found.velocities(q, late), rate)
 
-    def _seen(self, absolute: Array, table: Array) -> Array:
+    def _relative(self, absolute: Array, table: Array) -> Array:
         return absolute - table if self.stretch.on_table else absolute
 
     def shown(self, values: Array) -> Array:
@@ -145,8 +145,8 @@ def fit(stretch: Stretch, masses: tuple[float, float], start: Constants) -> Fit:
     """Fit the section, starting from the frame `start`. Raises Unusable if the fit fails."""
     from scipy.optimize import least_squares
 
-    there = np.isfinite(stretch.seen)
-    seen = np.where(there, stretch.seen, 0.0)
+    there = np.isfinite(stretch.readings)
+    seen = np.where(there, stretch.readings, 0.0)
     reach = np.maximum(np.abs(seen).max(axis=1), 1e-6)
     model = Shown(stretch, masses, reach)
     expected, uncertainty = _expectations()
@@ -191,7 +191,7 @@ def fit(stretch: Stretch, masses: tuple[float, float], start: Constants) -> Fit:
         masses=masses,
         values=values,
         fitted=shown,
-        residual=np.where(there, stretch.seen - shown, 0.0),
+        residual=np.where(there, stretch.readings - shown, 0.0),
         jacobian=jacobian,
         mass_jacobian=np.array([_mass_slope(model, values, which) * there for which in range(2)]),
         expected=known,

@@ -41,7 +41,7 @@ def modes_of(stretch: Stretch) -> tuple[Complex, Array]:
     many = max(round(1.0 / (RATE * stretch.step)), 1)
     rows = min(stretch.time.size, round(LENGTH / stretch.step)) // many
     shape = (2, rows, many)
-    seen = np.array([_filled(one) for one in stretch.seen])[:, : rows * many].reshape(shape).mean(axis=2)
+    seen = np.array([_filled(one) for one in stretch.readings])[:, : rows * many].reshape(shape).mean(axis=2)
     x = stretch.table[: rows * many].reshape(rows, many).mean(axis=1)
     if stretch.on_table:
         seen = seen + x

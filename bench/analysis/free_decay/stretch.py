@@ -31,14 +31,15 @@ class Unusable(RockbenchError):
 @dataclass(frozen=True, eq=False)
 class Stretch:
     """`time`, shape (n,) [s], evenly spaced, from the first sample; `table` [m], shape (n,), the reading of
-    the table's sensor, and `seen` [m], shape (2, n), the readings of the lasers on storeys 1 and 2, NaN where invalid.
+    the table's sensor, and `readings` [m], shape (2, n), the readings of the lasers on storeys 1 and 2, NaN where
+    invalid.
 
     If `on_table`, the lasers are fixed to the table and measure relative to it.
     """
 
     time: Array
     table: Array
-    seen: Array
+    readings: Array
     on_table: bool
 
     @property
@@ -67,16 +68,16 @@ class Stretch:
     def from_time(self, begin: float) -> "Stretch":
         """The section from `begin` [s] on."""
         kept = self.time >= begin
-        return replace(self, time=self.time[kept], table=self.table[kept], seen=self.seen[:, kept])
+        return replace(self, time=self.time[kept], table=self.table[kept], readings=self.readings[:, kept])
 
 
-def stretch_of(table: Array, seen: Array, sample_rate: float, *, on_table: bool) -> Stretch:
+def stretch_of(table: Array, readings: Array, sample_rate: float, *, on_table: bool) -> Stretch:
     """The section from raw signals: table displacement [m], shape (n,), and lasers [m], shape (2, n).
 
     Raises Unusable if more than the fraction `MOST_LOST` of a sensor's samples is missing; fewer missing samples of the
     table's sensor are interpolated linearly.
     """
-    for name, values in zip((TABLE_DISPLACEMENT, *STOREYS), (table, *seen), strict=True):
+    for name, values in zip((TABLE_DISPLACEMENT, *STOREYS), (table, *readings), strict=True):
         lost = float(np.mean(~np.isfinite(values)))
         if lost > MOST_LOST:
             raise Unusable(
@@ -88,6 +89,6 @@ def stretch_of(table: Array, seen: Array, sample_rate: float, *, on_table: bool)
     table = np.interp(index, index[there], table[there])
     many = max(floor(sample_rate / RATE), 1)
     rows = table.size // many
-    reduced = seen[:, : rows * many].reshape(2, rows, many).mean(axis=2)
+    reduced = readings[:, : rows * many].reshape(2, rows, many).mean(axis=2)
     time = np.asarray((np.arange(rows) + 0.5 * (many - 1) / many) * (many / sample_rate), np.float64)
     return Stretch(time, table[: rows * many].reshape(rows, many).mean(axis=1), reduced, on_table)

@@ -45,7 +45,7 @@ class Tilt:
     angle.
     """
 
-    seen: Recording
+    recording: Recording
     swings: Swings
     points: Points
     relation: Relation
@@ -57,28 +57,32 @@ class Tilt:
         return abs(self.fit.motion.tilt / self.swings.held) - 1.0
 
 
-def analyse_tilt(seen: Recording, specimen: Specimen, least: float) -> Tilt:
+def analyse_tilt(recording: Recording, specimen: Specimen, least: float) -> Tilt:
     """Analyse a recording down to the swing whose largest angle is below `least` [rad].
 
     Raises NotRocking, with a remedy, if the recording does not show free rocking.
     """
     alpha = critical_angle(specimen.block)
-    seen = without_gaps(seen)
-    swings = find_swings(seen, least)
+    recording = without_gaps(recording)
+    swings = find_swings(recording, least)
     # the laser's resolution limits the reading at rest, so the motion to both sides gives a better zero
     fit = fit_rocking(
-        seen, swings, find_points(seen, swings, swings.zero), alpha, frequency_parameter(specimen.block, specimen.g)
+        recording,
+        swings,
+        find_points(recording, swings, swings.zero),
+        alpha,
+        frequency_parameter(specimen.block, specimen.g),
     )
-    mean = float(abs(seen.height * swings.peaks).mean())
+    mean = float(abs(recording.height * swings.peaks).mean())
     if fit.rms > POOR * mean:
         raise NotRocking(
             f"the fit of the exact motion leaves an rms residual of {1e3 * fit.rms:.2g} mm, while the mean peak is "
             f"{1e3 * mean:.3g} mm: check that the block rocks on its two edges without yawing or sliding, then "
             "repeat the tilt"
         )
-    straight = replace(seen, displacement=fit.straightened(seen.displacement))
+    straight = replace(recording, displacement=fit.straightened(recording.displacement))
     points = find_points(straight, swings, 0.0)
-    return Tilt(seen, swings, points, amplitude_relation(points, alpha), fit)
+    return Tilt(recording, swings, points, amplitude_relation(points, alpha), fit)
 
 
 WAVES = (0.5, 3.0)

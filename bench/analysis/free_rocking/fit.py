@@ -133,7 +133,7 @@ def fit_rocking(seen: Recording, swings: Swings, points: Points, alpha: float, p
     Raises NotRocking if there are too few impacts, or if no motion of a rocking block fits.
     """
     size = max(round(seen.sample_rate / _RATE), 1)
-    times, displacement = _thinned(seen.times, size), _thinned(seen.displacement, size)
+    times, displacement = _block_means(seen.times, size), _block_means(seen.displacement, size)
     # mean over a bin = value at the centre of the bin + spread * second derivative
     spread = (size**2 - 1) / (24.0 * seen.sample_rate**2)
     swing = np.searchsorted(swings.crossings, times)
@@ -175,7 +175,7 @@ def _freed(seen: Recording, swings: Swings) -> float:
     return float(np.flatnonzero(np.abs(before) >= FREE * abs(swings.held))[-1]) / seen.sample_rate
 
 
-def _thinned(samples: Array, size: int) -> Array:
+def _block_means(samples: Array, size: int) -> Array:
     """Means of `size` consecutive samples each."""
     return samples[: samples.size // size * size].reshape(-1, size).mean(axis=1)
 

@@ -136,10 +136,10 @@ def _laser_lines(lasers: "list[FoundLaser]", missing: str | None) -> list[str]:
         return ["Serial ports:", f"  none: {missing}"]
     if not lasers:
         return ["Serial ports:", "  none: plug in the laser adapters and check that their driver is installed"]
-    return ["Serial ports:", *(f"  {laser.port}: {_said(laser)}" for laser in lasers)]
+    return ["Serial ports:", *(f"  {laser.port}: {_laser_text(laser)}" for laser in lasers)]
 
 
-def _said(laser: "FoundLaser") -> str:
+def _laser_text(laser: "FoundLaser") -> str:
     if laser.info is None:
         return laser.problem or "nothing"
     identity = f"{laser.info.identity}, {laser.baud} baud"

@@ -126,8 +126,8 @@ def emulate(
     )
     try:
         laboratory.start()
-        with _until_asked() as over:
-            _hand_out(configuration, laboratory, write)
+        with _until_interrupted() as over:
+            _write_client_configuration(configuration, laboratory, write)
             waiting.wait(over)
             # closed under the same handler, so that a second Ctrl-C does not interrupt the closing
             laboratory.close()
@@ -181,7 +181,9 @@ def _with_lead(configuration: "BenchConfiguration", lead: str | None) -> "BenchC
     return configuration.model_copy(update={"acquisition": changed})
 
 
-def _hand_out(configuration: "BenchConfiguration", laboratory: "Laboratory", path: Path | None) -> None:
+def _write_client_configuration(
+    configuration: "BenchConfiguration", laboratory: "Laboratory", path: Path | None
+) -> None:
     """Print or write the configuration of a client, and print instructions on standard error. Raises InvalidInput."""
     from bench.config.template import as_toml
 
@@ -205,7 +207,7 @@ def _hand_out(configuration: "BenchConfiguration", laboratory: "Laboratory", pat
 
 
 @contextmanager
-def _until_asked() -> Generator[threading.Event]:
+def _until_interrupted() -> Generator[threading.Event]:
     """Context manager that yields an event. Ctrl-C, SIGTERM and the closing of the terminal set it instead of ending
     the process.
     """

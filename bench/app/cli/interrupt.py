@@ -141,7 +141,7 @@ class Watch:
         self._numbers, self._written = socket.socketpair()
         self._written.setblocking(False)
         self._unanswered = threading.Lock()
-        self._told: list[str] = []
+        self._printed: list[str] = []
 
     def start(self) -> None:
         """Watch for signals until the process ends. Call in the main thread."""
@@ -163,9 +163,9 @@ class Watch:
 
     def _report_run(self) -> None:
         texts = ("ending the run: ramping the output to zero; Ctrl-C again cuts it", "cutting the output")
-        if len(self._told) < len(texts):
-            self._told.append(texts[len(self._told)])
-            self._say(f"rockbench: interrupted: {self._told[-1]}")
+        if len(self._printed) < len(texts):
+            self._printed.append(texts[len(self._printed)])
+            self._say(f"rockbench: interrupted: {self._printed[-1]}")
 
     @staticmethod
     def _say(text: str) -> None:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 MAX = "max"
 
-MOST_TOLD = 12
+MOST_LISTED = 12
 """Maximum number of differences that are listed."""
 
 
@@ -126,9 +126,9 @@ def _text(replayed: "Replayed", table: str) -> str:
         return "\n".join(lines)
     differences = sorted(replayed.found.differences, key=lambda each: each.rounding)
     lines.append(f"Compared with the file: {compared}")
-    lines += [("Rounding: " if each.rounding else "Differs: ") + each.text for each in differences[:MOST_TOLD]]
-    if len(differences) > MOST_TOLD:
-        lines.append(f"... and {len(differences) - MOST_TOLD} more (--json lists all)")
+    lines += [("Rounding: " if each.rounding else "Differs: ") + each.text for each in differences[:MOST_LISTED]]
+    if len(differences) > MOST_LISTED:
+        lines.append(f"... and {len(differences) - MOST_LISTED} more (--json lists all)")
     return "\n".join([*lines, _software(replayed)])
 
 

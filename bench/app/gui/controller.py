@@ -63,7 +63,7 @@ class Controller(QObject):
     """Emits a `bench.app.run_display.Notice` for the log."""
     event_received = Signal(object)
     """Emits an event of the engine."""
-    asked = Signal(object)
+    question_changed = Signal(object)
     """Emits a `Question`, and None when it is no longer open."""
     plan_checked = Signal(object, object)
     """Emits the result of `check_plan`, a `PlanChecked` or a `Refused`, and the object that requested it."""
@@ -71,7 +71,7 @@ class Controller(QObject):
     """Emits the `Run` that was just started."""
     ended = Signal(object)
     """Emits the end of the run: an `Ended` or a `Refused`."""
-    _heard = Signal()
+    _message_received = Signal()
 
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
@@ -84,7 +84,7 @@ class Controller(QObject):
         self._stopped_at: float | None = None
         self.scene = RunDisplay()
         self.inputs: Mapping[str, bool] = {}
-        self._inputs_heard: float | None = None
+        self._inputs_received: float | None = None
         self.driven = False
         """Whether the rig was armed in the current or last run."""
         self.run: Run | None = None
@@ -109,7 +109,7 @@ class Controller(QObject):
         self._timer.timeout.connect(self._look)
         self._timer.start()
         self._called = False
-        self._heard.connect(self._hear, Qt.ConnectionType.QueuedConnection)
+        self._message_received.connect(self._process_messages, Qt.ConnectionType.QueuedConnection)
 
     @property
     def running(self) -> bool:
@@ -140,9 +140,9 @@ class Controller(QObject):
     @property
     def inputs_age(self) -> float | None:
         """Time since the last message on the safety inputs of the current run [s]; None before the first."""
-        if not self._running or self._inputs_heard is None:
+        if not self._running or self._inputs_received is None:
             return None
-        return now() - self._inputs_heard
+        return now() - self._inputs_received
 
     @property
     def armed(self) -> bool:
@@ -180,14 +180,14 @@ class Controller(QObject):
         reason = scene.step if scene.state is State.RUNNING and scene.step else scene.reason
         return bench_status(link.status, scene.state, reason, link.silence)
 
-    def check_plan(self, asked: PlanCheck, by: object) -> None:
+    def check_plan(self, plan: PlanCheck, by: object) -> None:
         """Request a plan check, also while a run is under way; `plan_checked` emits the result. A new request replaces
         an earlier one made `by` the same object.
         """
-        self.give_up(by)
-        self._plan_checks[by] = SessionClient(asked, self._call)
+        self.cancel_check(by)
+        self._plan_checks[by] = SessionClient(plan, self._call)
 
-    def give_up(self, by: object) -> None:
+    def cancel_check(self, by: object) -> None:
         """Cancel the plan check requested `by` this object."""
         if (link := self._plan_checks.pop(by, None)) is not None:
             link.leave()
@@ -197,7 +197,7 @@ class Controller(QObject):
         if self._running or self.latched:
             return
         self._use(SessionClient(run, self._call), None)
-        self._introduce(run, 0.0)
+        self._set_run(run, 0.0)
 
     def attach(self, session: RunningSession) -> None:
         """Attach to a session that another window or a terminal has started, and show its run, which this window can
@@ -215,19 +215,19 @@ class Controller(QObject):
             self._link, self._running, self._started, self._question = None, False, 0.0, None
             self.scene, self.attached, self.latched = RunDisplay(), None, False
             link.leave()
-            self.asked.emit(None)
+            self.question_changed.emit(None)
             self.changed.emit()
 
     def _use(self, link: ClientConnection, attached: RunningSession | None) -> None:
         self.scene, self.inputs, self.lost, self._failure = RunDisplay(), {}, (0, 0), ""
-        self._inputs_heard, self.driven = None, False
+        self._inputs_received, self.driven = None, False
         self._waiting.clear()
         self._quiet, self._longest_quiet = 0.0, inf
         self.run, self.attached, self.controls, self.elsewhere = None, attached, attached is None, None
         self._link, self._running = link, True
         self._started, self._stopped_at = now(), None
 
-    def _introduce(self, run: Run, elapsed: float) -> None:
+    def _set_run(self, run: Run, elapsed: float) -> None:
         # a simulated bench that does not run in real time may be silent while the model computes
         paced = run.realtime or run.configuration.real_time_only
         self._longest_quiet = SILENCE + run.configuration.acquisition.block_duration if paced else inf
@@ -268,13 +268,13 @@ class Controller(QObject):
         if self._link is not None and self._question is not None and self.controls:
             self._link.answer(self._question.number, agreed=agreed)
             self._question = None
-            self.asked.emit(None)
+            self.question_changed.emit(None)
 
     def close(self) -> None:
         """Disconnect from the session: the run ramps out, unless it is to continue without a client."""
         self._timer.stop()
         for by in list(self._plan_checks):
-            self.give_up(by)
+            self.cancel_check(by)
         link, self._link, self._running = self._link, None, False
         if link is not None:
             link.leave()
@@ -285,9 +285,9 @@ class Controller(QObject):
             self._called = True
             # the window may have been closed
             with suppress(RuntimeError):
-                self._heard.emit()
+                self._message_received.emit()
 
-    def _hear(self) -> None:
+    def _process_messages(self) -> None:
         self._called = False
         self._look()
 
@@ -351,22 +351,22 @@ class Controller(QObject):
             case Preparing():
                 self.scene.prepare(message.phase, message.done, message.total)
             case Attached():
-                self._introduce(message.run, message.elapsed)
+                self._set_run(message.run, message.elapsed)
             case Control():
                 self.controls = message.granted
-                self.asked.emit(self._question if message.granted else None)
+                self.question_changed.emit(self._question if message.granted else None)
             case Opened():
                 self.scene.expect(message.duration)
             case Question():
                 self._question = message
                 if self.controls:
-                    self.asked.emit(message)
+                    self.question_changed.emit(message)
             case SafetyInputs():
-                self.inputs, self._inputs_heard = message.good, now()
+                self.inputs, self._inputs_received = message.good, now()
             case Ended():
-                self._over(message, Notice(self.scene.time, "end", f"{message.status}: {message.reason}"))
+                self._finish_run(message, Notice(self.scene.time, "end", f"{message.status}: {message.reason}"))
             case Refused():
-                self._over(message, Notice(self.scene.time, "end", message.text, grave=True))
+                self._finish_run(message, Notice(self.scene.time, "end", message.text, grave=True))
             case _:
                 pass
 
@@ -374,9 +374,9 @@ class Controller(QObject):
         self.driven = self.driven or state in DRIVEN
         if state is not State.WAITING and self._question is not None:
             self._question = None
-            self.asked.emit(None)
+            self.question_changed.emit(None)
 
-    def _over(self, message: Ended | Refused, notice: Notice) -> None:
+    def _finish_run(self, message: Ended | Refused, notice: Notice) -> None:
         self._link, self._running, self._question = None, False, None
         self._stopped_at = now()
         if isinstance(message, Ended):
@@ -385,6 +385,6 @@ class Controller(QObject):
             self.scene.state = State.CLOSED
             self.scene.reason = message.text
             self._failure = texts.FAILED.format(text=message.text) if message.failed else ""
-        self.asked.emit(None)
+        self.question_changed.emit(None)
         self.noticed.emit(notice)
         self.ended.emit(message)

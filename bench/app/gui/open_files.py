@@ -58,7 +58,7 @@ def read_file(path: Path) -> RunFile:
         length = clock(record.rows / record.sample_rate)
         return RunFile(
             path,
-            texts.FILE_TOLD.format(
+            texts.FILE_SUMMARY.format(
                 path=path, start=moment(record.start_time), status=record.status, summary=record.summary, length=length
             ),
             record.points,

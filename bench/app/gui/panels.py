@@ -83,7 +83,7 @@ class Prompt(QFrame):
     def __init__(self, controller: Controller) -> None:
         super().__init__()
         self.setObjectName("prompt")
-        self._asked: OperatorAsked | None = None
+        self._operator_event: OperatorAsked | None = None
         self.request = QLabel(wordWrap=True)
         self.request.setProperty("role", "value")
         self.done, self.decline = QPushButton(texts.DONE), QPushButton(texts.DECLINE)
@@ -113,12 +113,12 @@ class Prompt(QFrame):
         row.addWidget(self.decline)
         self.hide()
         controller.event_received.connect(self._tell)
-        controller.asked.connect(self._ask)
+        controller.question_changed.connect(self._ask)
 
     def _tell(self, event: Event) -> None:
         """Store the event that precedes the question and contains the kind of task."""
         if isinstance(event, OperatorAsked):
-            self._asked = event
+            self._operator_event = event
 
     def _ask(self, question: Question | None) -> None:
         self.setVisible(question is not None)
@@ -127,8 +127,8 @@ class Prompt(QFrame):
         self._take_answers(False)
         self._unread.start()
         self.request.setText(typeset(question.request))
-        known = self._asked is not None and self._asked.request == question.request
-        work = self._asked.work if known and self._asked is not None else None
+        known = self._operator_event is not None and self._operator_event.request == question.request
+        work = self._operator_event.work if known and self._operator_event is not None else None
         said = UNKNOWN_TASK if work is None else TASKS[work]
         for label, name, text in zip(self.parts, texts.PROMPT_PARTS, said, strict=True):
             label.setText(f"{name}: {text}")

@@ -51,7 +51,7 @@ class PlanView(QWidget):
         self.warning.setText(f"▲ {text}")
         self.warning.setVisible(bool(text))
 
-    def say(self, text: str) -> None:
+    def show_text(self, text: str) -> None:
         """Show `text` instead of a result."""
         self._show("calm", text, "", ())
 

@@ -107,13 +107,13 @@ class ProtocolPage(QWidget):
     def check_plan(self) -> None:
         """Request a plan check."""
         try:
-            asked = self._asked()
+            plan = self._plan_check()
         except RockbenchError as error:
             self.plan.refuse(str(error))
             return
         self._checked, self._checking = None, True
-        self.plan.say(texts.CHECKING)
-        self._controller.check_plan(asked, by=self)
+        self.plan.show_text(texts.CHECKING)
+        self._controller.check_plan(plan, by=self)
         self.refresh()
 
     def begin(self) -> None:
@@ -122,16 +122,16 @@ class ProtocolPage(QWidget):
         if self.why_not or checked is None:
             return
         try:
-            asked = self._asked()
+            plan = self._plan_check()
             if self.options.out is None:
-                self._made = make_folder(asked.out)
-                asked = replace(asked, out=self._made)
+                self._made = make_folder(plan.out)
+                plan = replace(plan, out=self._made)
         except RockbenchError as error:
             self.plan.refuse(str(error))
             return
         self._began = True
         self.predicted.emit(checked.prediction)
-        self._controller.start(self.options.run(asked))
+        self._controller.start(self.options.run(plan))
 
     def enqueue(self) -> None:
         """Append the checked plan to the queue, or replace the test being edited."""
@@ -179,7 +179,7 @@ class ProtocolPage(QWidget):
         self.check.setToolTip(texts.START_BAD if self.form.refused else texts.CHECK_TIP)
         self.plan.warn(texts.UNATTENDED if self.options.unattended else "")
 
-    def _asked(self) -> PlanCheck:
+    def _plan_check(self) -> PlanCheck:
         """The plan in the form. Raises InvalidInput."""
         entry, parameters = self.entry, self.form.parameters()
         out = self.options.out or Path(self.folder.placeholderText())
@@ -208,9 +208,9 @@ class ProtocolPage(QWidget):
 
     def _edited(self) -> None:
         self._checked, self._checking = None, False
-        self._controller.give_up(self)
+        self._controller.cancel_check(self)
         self.folder.setPlaceholderText(str(default_folder(self.entry.name, datetime.now())))
-        self.plan.say(texts.START_UNCHECKED.capitalize() + ".")
+        self.plan.show_text(texts.START_UNCHECKED.capitalize() + ".")
         self.refresh()
 
     def _plan_checked(self, found: PlanChecked | Refused, by: object) -> None:
@@ -248,9 +248,9 @@ class ProtocolPage(QWidget):
         self.start.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.leave.hide()
         left, right = QWidget(), QWidget()
-        asked, found = QVBoxLayout(left), QVBoxLayout(right)
+        plan, found = QVBoxLayout(left), QVBoxLayout(right)
         for part in (self.choice, self.form_area, self.options):
-            asked.addWidget(part, int(part is self.form_area))
+            plan.addWidget(part, int(part is self.form_area))
         found.addWidget(self.plan, 1)
         buttons = QHBoxLayout()
         buttons.addStretch(1)
@@ -258,7 +258,7 @@ class ProtocolPage(QWidget):
             buttons.addWidget(button)
         halves = QSplitter()
         halves.setChildrenCollapsible(False)
-        for half, column in ((left, asked), (right, found)):
+        for half, column in ((left, plan), (right, found)):
             column.setContentsMargins(0, 0, 0, 0)
             halves.addWidget(half)
         halves.setSizes([500, 740])

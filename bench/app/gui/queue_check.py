@@ -49,7 +49,7 @@ class QueueCheck(QObject):
         self._tests: tuple[Queued, ...] = ()
         self._configuration = BenchConfiguration()
         self._left: list[tuple[Queued, Ready]] = []
-        self._asked: PlanCheck | None = None
+        self._plan: PlanCheck | None = None
         self.test: Queued | None = None
         """The test that is being checked."""
         self._reader = Reader(self)
@@ -70,11 +70,11 @@ class QueueCheck(QObject):
         self._reader.call(lambda: all_ready(whole, configuration))
         self.changed.emit()
 
-    def give_up(self) -> None:
+    def cancel(self) -> None:
         """Cancel the check."""
-        self.test, self._asked = None, None
+        self.test, self._plan = None, None
         self._left.clear()
-        self._controller.give_up(self)
+        self._controller.cancel_check(self)
 
     def forget(self) -> None:
         """Discard the results: the next start checks every plan again."""
@@ -88,7 +88,7 @@ class QueueCheck(QObject):
         if self.test is None:
             return
         if not isinstance(found, Mapping):
-            self.give_up()
+            self.cancel()
             self.refused.emit(None, str(found))
             return
         every = cast(Mapping[int, Ready], found)
@@ -104,11 +104,11 @@ class QueueCheck(QObject):
             self.test, ready = self._left.pop(0)
             out = Path(self.test.out or "runs")
             plan = PlanCheck(ready.protocol.name, ready.prepared.parameters, self._configuration, out)
-            self._asked = plan
+            self._plan = plan
             self._controller.check_plan(plan, by=self)
             self.changed.emit()
             return
-        self.give_up()
+        self.cancel()
         found = [each for test in self._waiting if (each := self.known(test, self._configuration)) is not None]
         refused = room_refusal(each.room for each in found)
         if refused is not None:
@@ -117,14 +117,14 @@ class QueueCheck(QObject):
             self.good.emit()
 
     def _plan_checked(self, found: PlanChecked | Refused, by: object) -> None:
-        test, asked = self.test, self._asked
-        if by is not self or test is None or asked is None:
+        test, plan = self.test, self._plan
+        if by is not self or test is None or plan is None:
             return
-        self._asked = None
+        self._plan = None
         refusal = found.text if isinstance(found, Refused) else found.refusal
         if isinstance(found, PlanChecked) and refusal is None:
-            self._checked.append(Checked(test, asked, found))
+            self._checked.append(Checked(test, plan, found))
             self._next()
         else:
-            self.give_up()
+            self.cancel()
             self.refused.emit(test, str(refusal))

@@ -44,7 +44,7 @@ QUEUE_ACTIONS = (
 class QueuePage(QWidget):
     """List of tests; every action applies to the selected test and has a shortcut key."""
 
-    edit_asked = Signal(object, int)
+    edit_requested = Signal(object, int)
     """Emits a `Queued` that is to be edited and has not begun, and its number."""
 
     def __init__(self, controller: Controller, runner: QueueRunner, entries: Sequence[Protocol[Any]]) -> None:
@@ -87,7 +87,7 @@ class QueuePage(QWidget):
         for index, test in enumerate(tests):
             for column, text in enumerate(self._cells(index, test)):
                 item = QTableWidgetItem(text)
-                item.setToolTip(self._all_of(test) if column == 3 else text)
+                item.setToolTip(self._all_parameters(test) if column == 3 else text)
                 self.table.setItem(index, column, item)
         if tests:
             self.table.setCurrentCell(min(max(row, 0), len(tests) - 1), 0)
@@ -131,15 +131,22 @@ class QueuePage(QWidget):
         self.buttons["skip"].setText(texts.TAKE_IN if skipped else QUEUE_ACTIONS[3][1])
 
     def _cells(self, index: int, test: Queued) -> tuple[str, ...]:
-        told = test.told or self._options_of(test)
-        return (str(index + 1), texts.STAGES[test.stage], test.protocol, self._asked_of(test), test.out or ABSENT, told)
+        outcome = test.told or self._options_of(test)
+        return (
+            str(index + 1),
+            texts.STAGES[test.stage],
+            test.protocol,
+            self._changed_parameters(test),
+            test.out or ABSENT,
+            outcome,
+        )
 
-    def _asked_of(self, test: Queued) -> str:
+    def _changed_parameters(self, test: Queued) -> str:
         """Parameters that differ from the defaults."""
-        return ", ".join(_said(of, value) for of, value in self._values(test) if value != _plain(of.default))
+        return ", ".join(_parameter_text(of, value) for of, value in self._values(test) if value != _plain(of.default))
 
-    def _all_of(self, test: Queued) -> str:
-        return "\n".join(_said(of, value) for of, value in self._values(test))
+    def _all_parameters(self, test: Queued) -> str:
+        return "\n".join(_parameter_text(of, value) for of, value in self._values(test))
 
     def _values(self, test: Queued) -> list[tuple[Declared, object]]:
         entry = self._entries.get(test.protocol)
@@ -178,7 +185,7 @@ class QueuePage(QWidget):
     def _edit(self) -> None:
         index = self.selected
         if index is not None and self.buttons["edit"].isEnabled():
-            self.edit_asked.emit(self._runner.queue.tests[index], index + 1)
+            self.edit_requested.emit(self._runner.queue.tests[index], index + 1)
 
     def _arrange(self) -> None:
         self.table.setHorizontalHeaderLabels(texts.QUEUE_TITLES)
@@ -229,7 +236,7 @@ def _plain(default: object) -> object:
     return [*cast(tuple[object, ...], default)] if isinstance(default, tuple) else getattr(default, "value", default)
 
 
-def _said(of: Declared, value: object) -> str:
+def _parameter_text(of: Declared, value: object) -> str:
     """A parameter with value and unit, as typed in the form."""
     values = cast(list[object], value) if isinstance(value, list) else [value]
     text = " ".join(as_typed(each) for each in values)

@@ -59,7 +59,7 @@ class QueueRunner(QObject):
         self._check.changed.connect(self.changed)
         controller.began.connect(self._began)
         controller.ended.connect(self._ended)
-        controller.changed.connect(self._heed_stop)
+        controller.changed.connect(self._pause_if_stopped)
 
     @property
     def why_not(self) -> str:
@@ -113,13 +113,13 @@ class QueueRunner(QObject):
 
     def pause(self, why: str = "") -> None:
         """Start no further test. The current test continues; plan checks are cancelled."""
-        self._check.give_up()
+        self._check.cancel()
         self.going, self.why = False, why or self.why
         self._controller.held = ""
         self.changed.emit()
         self._controller.changed.emit()
 
-    def _heed_stop(self) -> None:
+    def _pause_if_stopped(self) -> None:
         if self.going and self._controller.latched:
             self.pause(texts.QUEUE_STOPPED)
 
@@ -145,7 +145,9 @@ class QueueRunner(QObject):
         if index is None:
             self.pause(f"{why}.")
         else:
-            self._over(index, good=False, told=f"refused: {why}", why=texts.QUEUE_REFUSED.format(number=index + 1))
+            self._finish_test(
+                index, good=False, told=f"refused: {why}", why=texts.QUEUE_REFUSED.format(number=index + 1)
+            )
 
     def _begin(self, index: int, each: Checked) -> None:
         test, plan = each.test, each.plan
@@ -191,9 +193,9 @@ class QueueRunner(QObject):
             status, good = ended.status, passed and ended.status in GOOD
             told = ended.reason if passed else "not passed"
         why = "" if status == "completed" and good else texts.QUEUE_ENDED.format(number=index + 1, status=status)
-        self._over(index, good=good, told=f"{status}: {told}", why=why)
+        self._finish_test(index, good=good, told=f"{status}: {told}", why=why)
 
-    def _over(self, index: int, *, good: bool, told: str, why: str) -> None:
+    def _finish_test(self, index: int, *, good: bool, told: str, why: str) -> None:
         kept = self.do(lambda: self.queue.finish(index, good=good, told=told))
         if why or not kept:
             self.pause(self.why if self._controller.latched else why)

@@ -76,7 +76,7 @@ class RunPage(QWidget):
         self.panel = LogPanel(controller)
         self.log = self.panel.text
         self.point, self.verdict = ElidingLabel(), VerdictLabel()
-        self.verdict.say(texts.NO_GAIN)
+        self.verdict.show_sentence(texts.NO_GAIN)
         # always one line, so that they neither widen the page nor move the content below
         self.lost, self.twin = ElidingLabel(), ElidingLabel()
         self.ramp_out = QPushButton(texts.RAMP_OUT)
@@ -171,7 +171,7 @@ class RunPage(QWidget):
         self.shown_plot.setVisible(has_gain)
         self._has_live_value = False
         self._show_point("")
-        self.verdict.say(texts.NO_GAIN if has_gain else texts.NO_RESULT)
+        self.verdict.show_sentence(texts.NO_GAIN if has_gain else texts.NO_RESULT)
         self.arrangement = Arrangement()
         self.picture.use(run.configuration.known_specimen)
         self.traces.watch_block(None)
@@ -213,20 +213,20 @@ class RunPage(QWidget):
         match event:
             case Estimate():
                 self._show_point(texts.MEASURING.format(point=_sine(event.omega, event.beta)))
-                self.verdict.say(running_verdict(event))
+                self.verdict.show_sentence(running_verdict(event))
                 self.gains.show_running(event)
                 self.steady.point(event.omega, event.beta)
                 for plot in self.motion:
                     plot.omega = event.omega
                 self._couple(event.beta)
             case RunningGain():
-                self._show_point(texts.MEASURING.format(point=_under(event.record, event.beta)))
-                self.verdict.say(running_verdict(event))
+                self._show_point(texts.MEASURING.format(point=_record_point_name(event.record, event.beta)))
+                self.verdict.show_sentence(running_verdict(event))
                 self.gains.show_running(event)
                 self._couple(event.beta)
             case LiveValue():
                 self._has_live_value = True
-                self.verdict.say(running_verdict(event))
+                self.verdict.show_sentence(running_verdict(event))
             case PointFinished():
                 self._finish(event)
             case FitFinished() | TableIdentified() if self.shown_plot.currentWidget() is self.live:
@@ -234,7 +234,7 @@ class RunPage(QWidget):
                 self.live.show_result(event)
                 self._show_result(event)
             case StepStarted():
-                self.steady.over()
+                self.steady.finish()
                 for plot in self.motion:
                     plot.omega = None
             case TwinEstimate():
@@ -254,17 +254,23 @@ class RunPage(QWidget):
         if protocol is None:
             return
         if protocol.log_line is not None:
-            self.verdict.say(typeset(protocol.log_line(event.point)))
+            self.verdict.show_sentence(typeset(protocol.log_line(event.point)))
         elif protocol.view.headline or not self._has_live_value:
             # for a protocol without a headline, the live value is the verdict
-            self.verdict.say(verdict_of(protocol.view, event.point))
+            self.verdict.show_sentence(verdict_of(protocol.view, event.point))
         if "alpha_2" not in point:
             return
         self.shown_plot.setCurrentWidget(self.gains)
         self.shown_plot.show()
         self.gains.add(point)
         omega, beta = point.get("omega_rad_s"), point.get("beta")
-        where = _under(point["record"], beta) if "record" in point else "" if omega is None else _sine(omega, beta)
+        where = (
+            _record_point_name(point["record"], beta)
+            if "record" in point
+            else ""
+            if omega is None
+            else _sine(omega, beta)
+        )
         self._show_point(texts.LAST_POINT.format(status=point.get("status", ""), point=where))
 
     def _show_result(self, event: FitFinished | TableIdentified) -> None:
@@ -272,7 +278,7 @@ class RunPage(QWidget):
             name, found = next(iter(event.parameters.items()))
             factor, unit = in_screen_unit(found.unit)
             value = measurement(factor * found.value, COVERAGE * factor * found.uncertainty, unit)
-            self.verdict.say(f"{label(name)} {value}")
+            self.verdict.show_sentence(f"{label(name)} {value}")
             self._show_point(f"{typeset(event.name)}: {typeset(event.text)}")
         else:
             self._show_point(typeset(event.text))
@@ -311,6 +317,6 @@ def _sine(omega: float, beta: float | None) -> str:
     return (texts.BARE_SINE if beta is None else texts.SINE_POINT).format(omega=omega, beta=beta)
 
 
-def _under(record: str, beta: float | None) -> str:
+def _record_point_name(record: str, beta: float | None) -> str:
     """Name of a point under a record."""
     return (texts.BARE_RECORD if beta is None else texts.RECORD_POINT).format(record=record, beta=beta)

@@ -38,7 +38,7 @@ class SensorSteadiness:
     """
 
     def __init__(self, omega: float, tolerance: float, jitter: float, *, beside_table: bool) -> None:
-        self._omega, self._tolerance, self._beside_table = omega, tolerance, beside_table
+        self._omega, self._tolerance, self._relative = omega, tolerance, beside_table
         self._detectors = [
             SteadyDetector(tolerance, [place], jitter=jitter, reference=LASERS if place in LASERS else ())
             for place in range(len(SENSORS))
@@ -55,7 +55,7 @@ class SensorSteadiness:
         gap = self._time.size > 0 and abs(float(time[0] - self._time[-1]) - traces.step) > traces.step
         if traces.run != self._run or gap:
             self._restart(traces.run)
-        self._time, self._values = np.append(self._time, time), np.append(self._values, self._seen(traces), axis=0)
+        self._time, self._values = np.append(self._time, time), np.append(self._values, self._measured(traces), axis=0)
         period = tau / self._omega
         while float(self._time[-1] - self._time[0]) >= period:
             n = int(np.searchsorted(self._time, float(self._time[0]) + period))
@@ -69,11 +69,11 @@ class SensorSteadiness:
         """Whether unequal cycles form a repeating pattern; a slow change from cycle to cycle is not such a pattern."""
         return found.repeats > 1 and found.spread > SPREAD * self._tolerance
 
-    def _seen(self, traces: Traces) -> NDArray[np.float64]:
+    def _measured(self, traces: Traces) -> NDArray[np.float64]:
         """Midpoints of the bins as measured by the sensors, shape (n, len(SENSORS))."""
         middle = 0.5 * (traces.low.astype(np.float64) + traces.high)
         seen = middle[:, [ACCELERATION, DISPLACEMENT, U1, U2]]
-        if self._beside_table:
+        if self._relative:
             seen[:, LASERS] += middle[:, [DISPLACEMENT]]
         return seen
 
@@ -133,7 +133,7 @@ class SteadyView(QWidget):
             )
             self.show()
 
-    def over(self) -> None:
+    def finish(self) -> None:
         """End the current sine."""
         self._of, self._judged = None, None
         self.hide()

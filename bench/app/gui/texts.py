@@ -158,7 +158,7 @@ FACTOR_TIP = "Magnification of the motion relative to the frame: use the wheel, 
 
 OPEN, OPEN_TIP = "Open a file …", "Opens the campaign.h5 of a run (Ctrl+O)."
 OPEN_BESIDE = "{why}; a path can be typed at any time"
-FILE_TOLD = "{path}\n{start}, {status}: {summary} ({length} of samples)"
+FILE_SUMMARY = "{path}\n{start}, {status}: {summary} ({length} of samples)"
 RUN_FILES = "campaign (*.h5)"
 CONFIGURATION_FILES, SPECIMEN_FILES = "configuration (*.toml)", "specimen (*.json)"
 REMOVE, REMOVE_TIP = "Close file", "Removes the selected file from this page; it is not deleted."

@@ -142,8 +142,8 @@ class TroublePanel(QFrame):
         controller.ended.connect(self._end)
 
     def show_trouble(self, trouble: Trouble) -> None:
-        said = (trouble.what, trouble.did, trouble.now)
-        for label, text in zip(self.answers, said, strict=True):
+        message = (trouble.what, trouble.did, trouble.now)
+        for label, text in zip(self.answers, message, strict=True):
             label.setText(typeset(text))
         self.details.setPlainText(trouble.details)
         self.more.setVisible(bool(trouble.details))
@@ -195,8 +195,8 @@ class OwnErrors(QObject):
     def __init__(self, controller: Controller, panel: TroublePanel) -> None:
         super().__init__(controller)
         self._controller, self._panel = controller, panel
-        self._told = set[str]()
-        self._raised.connect(self._tell, Qt.ConnectionType.QueuedConnection)
+        self._reported = set[str]()
+        self._raised.connect(self._report, Qt.ConnectionType.QueuedConnection)
 
     def install(self) -> Callable[[], None]:
         """Replace `sys.excepthook` and `threading.excepthook`; returns a function that restores them."""
@@ -218,14 +218,14 @@ class OwnErrors(QObject):
 
         return undo
 
-    def _tell(self, error: BaseException) -> None:
-        said = f"{type(error).__name__}: {error}"
-        if said in self._told:
+    def _report(self, error: BaseException) -> None:
+        message = f"{type(error).__name__}: {error}"
+        if message in self._reported:
             return
-        self._told.add(said)
-        text = texts.OWN_ERROR.format(error=said)
+        self._reported.add(message)
+        text = texts.OWN_ERROR.format(error=message)
         self._controller.noticed.emit(Notice(self._controller.scene.time, "window", text, grave=True))
         if self._panel.isHidden():
             details = "".join(format_exception(error))
-            what = OWN_TROUBLE.format(error=said)
+            what = OWN_TROUBLE.format(error=message)
             self._panel.show_trouble(Trouble(what, OWN_DID, OWN_NOW, details))

@@ -81,7 +81,7 @@ class VerdictLabel(QLabel):
         self.sentence = ""
         self._size = LARGEST
 
-    def say(self, sentence: str) -> None:
+    def show_sentence(self, sentence: str) -> None:
         """Show a sentence."""
         if sentence != self.sentence:
             self.sentence = sentence

@@ -142,7 +142,7 @@ class Window(QMainWindow):
         self.pages.setCurrentWidget(self.protocol)
         free_tab_key(whole)
         self._connect()
-        self._entitle()
+        self._update_title()
         if settings is not None:
             restore(self, self.pages, settings)
 
@@ -202,7 +202,7 @@ class Window(QMainWindow):
         self.protocol.queued.connect(self._enqueue)
         self.protocol.saved.connect(runner.replace)
         self.protocol.left.connect(lambda: self.pages.setCurrentWidget(self.queue))
-        self.queue.edit_asked.connect(self._edit)
+        self.queue.edit_requested.connect(self._edit)
 
     def _began(self, run: Run) -> None:
         self._goes_on = run.keep_going
@@ -220,9 +220,9 @@ class Window(QMainWindow):
         self.protocol.use(configuration)
         self.runner.configuration = configuration
         self.welcome.give_way("a real bench", to=configuration.backend != "simulated")
-        self._entitle()
+        self._update_title()
 
-    def _entitle(self) -> None:
+    def _update_title(self) -> None:
         name = self.setup.path.name if self.setup.path is not None else texts.VIRTUAL_SHORT
         self.setWindowTitle(f"{texts.TITLE} · {name}")
 

@@ -52,7 +52,7 @@ def announced(server: SessionServer, run: Run, owner: str) -> Generator[None]:
     except OSError as error:
         remove(path, lock)
         why = f"no other window can attach to this run: {error}"
-        server.outbox.put(Published(Warned(why, time=0.0)))
+        server.broadcast.put(Published(Warned(why, time=0.0)))
         yield
         return
     over = threading.Event()

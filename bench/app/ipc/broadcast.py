@@ -116,7 +116,7 @@ class Broadcast:
         self._last: dict[Hashable, FromSession] = {}
 
     @property
-    def heard(self) -> bool:
+    def has_clients(self) -> bool:
         """Whether the session has a client."""
         return bool(self._queues)
 
@@ -142,7 +142,7 @@ class Broadcast:
         with self._lock:
             self._queues = [each for each in self._queues if each is not queue]
 
-    def answered(self) -> None:
+    def discard_question(self) -> None:
         """Discard the answered question: clients that join later do not receive it."""
         with self._lock:
             self._last.pop(Question, None)

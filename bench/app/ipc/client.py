@@ -51,13 +51,13 @@ class ClientConnection:
     """A client's connection to a session. All methods return at once, and may be called by any thread.
 
     The client's main loop must call `alive` at least every `bench.app.ipc.messages.BEAT` seconds; otherwise the session
-    considers the client frozen. `heard` is called in a thread of the connection when messages have arrived. `out` is
-    the folder of a run: if the last message was lost, the end of the run is read from the files in it. It is None for
-    other sessions.
+    considers the client frozen. `on_message` is called in a thread of the connection when messages have arrived. `out`
+    is the folder of a run: if the last message was lost, the end of the run is read from the files in it. It is None
+    for other sessions.
     """
 
-    def __init__(self, out: Path | None, heard: Callable[[], None]) -> None:
-        self._out, self._tell = out, heard
+    def __init__(self, out: Path | None, on_message: Callable[[], None]) -> None:
+        self._out, self._tell = out, on_message
         self._received: deque[FromSession] = deque(maxlen=KEPT)
         self._outgoing = SimpleQueue[FromClient | None]()
         self._heard = now()
@@ -136,7 +136,7 @@ class ClientConnection:
             while (message := self._outgoing.get()) is not None:
                 connection.send(message)
 
-    def _end_unheard(self, text: str, details: str, *, by_files: bool = True) -> None:
+    def _end_without_message(self, text: str, details: str, *, by_files: bool = True) -> None:
         """Report the end of a session that sent no final message: from its files if it wrote them, else with `text` as
         the reason.
         """
@@ -165,11 +165,11 @@ class ClientConnection:
 class SessionClient(ClientConnection):
     """A session process and the connection to it: the owner of a run, or a plan check."""
 
-    def __init__(self, assignment: PlanCheck, heard: Callable[[], None] = lambda: None) -> None:
+    def __init__(self, assignment: PlanCheck, on_message: Callable[[], None] = lambda: None) -> None:
         self._checks_plan = not isinstance(assignment, Run)
         # an existing summary is from another run
         summary = assignment.out / SUMMARY
-        super().__init__(None if self._checks_plan or summary.exists() else assignment.out, heard)
+        super().__init__(None if self._checks_plan or summary.exists() else assignment.out, on_message)
         self._errors = tempfile.TemporaryFile()  # noqa: SIM115 - closed with the process
         key = secrets.token_bytes(32)
         self._listener = Listener(authkey=key)
@@ -220,15 +220,15 @@ class SessionClient(ClientConnection):
         last_words = self._errors.read().decode(errors="replace").strip()
         told = f": {last_words.splitlines()[-1]}" if last_words else ""
         text = f"the session process ended without a message (exit code {code}){told}"
-        self._end_unheard(text, last_words, by_files=code == 0)
+        self._end_without_message(text, last_words, by_files=code == 0)
         self._errors.close()
 
 
 class AttachedClient(ClientConnection):
     """A further client of a session that another client, or a terminal, has started."""
 
-    def __init__(self, session: RunningSession, heard: Callable[[], None] = lambda: None) -> None:
-        super().__init__(Path(session.out), heard)
+    def __init__(self, session: RunningSession, on_message: Callable[[], None] = lambda: None) -> None:
+        super().__init__(Path(session.out), on_message)
         self._talking = threading.Thread(target=self._talk, args=(session,), name="link", daemon=True)
         self._talking.start()
 
@@ -242,4 +242,4 @@ class AttachedClient(ClientConnection):
             Client(session.address, authkey=bytes.fromhex(session.key)) as connection,
         ):
             self._converse(connection)
-        self._end_unheard("the session ended without a message", "")
+        self._end_without_message("the session ended without a message", "")

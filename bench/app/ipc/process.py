@@ -62,10 +62,10 @@ def serve(connection: Connection) -> None:
     host.close(last, FAREWELL)
 
 
-def _check_plan(asked: PlanCheck) -> FromSession:
+def _check_plan(assignment: PlanCheck) -> FromSession:
     _give_way()
-    prepared = load_protocol(asked.protocol).prepare(asked.parameters, asked.configuration, None)
-    found = compile_run(asked.protocol, prepared, asked.out)
+    prepared = load_protocol(assignment.protocol).prepare(assignment.parameters, assignment.configuration, None)
+    found = compile_run(assignment.protocol, prepared, assignment.out)
     room = found.room
     return PlanChecked(
         margins=found.margins,
@@ -79,28 +79,28 @@ def _check_plan(asked: PlanCheck) -> FromSession:
     )
 
 
-def _run(asked: Run, host: SessionServer, requests: Requests) -> FromSession:
-    configuration = asked.configuration
+def _run(assignment: Run, host: SessionServer, requests: Requests) -> FromSession:
+    configuration = assignment.configuration
     _abort_on_terminate(requests)
 
-    protocol, teller = load_protocol(asked.protocol), Publisher(host)
+    protocol, teller = load_protocol(assignment.protocol), Publisher(host)
     with requests.without_rig():
         if requests.strongest is not None:
             raise KeyboardInterrupt
-        prepared = prepare(protocol, asked.parameters, configuration, teller.prepare)
+        prepared = prepare(protocol, assignment.parameters, configuration, teller.prepare)
     ended = run_session(
         protocol,
         prepared,
-        out=asked.out,
-        operator=RemoteOperator(host, requests) if asked.person else Unattended(_policy(configuration)),
+        out=assignment.out,
+        operator=RemoteOperator(host, requests) if assignment.person else Unattended(_policy(configuration)),
         subscribers=[teller],
         opened=lambda rig, publish: teller.opened(rig, publish, prepared),
         progress=teller.prepare,
         requests=requests,
-        realtime=asked.realtime,
-        about=asked.about,
+        realtime=assignment.realtime,
+        about=assignment.about,
     )
-    return ended_message(ended, asked.out)
+    return ended_message(ended, assignment.out)
 
 
 def _policy(configuration: BenchConfiguration) -> str:

@@ -53,8 +53,8 @@ PERIOD = 0.5
 class SafetyWatch:
     """Reads the rig's safety inputs for the display; to be called in the engine's thread only."""
 
-    def __init__(self, outbox: Broadcast) -> None:
-        self._outbox = outbox
+    def __init__(self, broadcast: Broadcast) -> None:
+        self._broadcast = broadcast
         self._rig: Rig | None = None
         self._looked = -PERIOD
         self._time = 0.0
@@ -69,9 +69,9 @@ class SafetyWatch:
         they are reported elsewhere.
         """
         with suppress(RigError):
-            self.look_driven(time, at_once=at_once)
+            self.update_driven(time, at_once=at_once)
 
-    def look_driven(self, time: float | None = None, *, at_once: bool = False) -> None:
+    def update_driven(self, time: float | None = None, *, at_once: bool = False) -> None:
         """Like `look`, for an armed rig: raises RigError if the inputs cannot be read. In this case the rig has cut its
         output, and only this error states the reason.
         """
@@ -79,7 +79,7 @@ class SafetyWatch:
         if self._rig is None or (now() - self._looked < PERIOD and not at_once):
             return
         self._looked = now()
-        self._outbox.put(SafetyInputs(self._time, dict(self._rig.interlocks())))
+        self._broadcast.put(SafetyInputs(self._time, dict(self._rig.interlocks())))
 
 
 _LOOK = 0.1
@@ -108,8 +108,8 @@ class SessionServer:
         pending: Callable[[], bool] = lambda: False,
     ) -> None:
         self._requests, self._lost, self._pending = requests, lost, pending
-        self.outbox = Broadcast()
-        self.inputs = SafetyWatch(self.outbox)
+        self.broadcast = Broadcast()
+        self.inputs = SafetyWatch(self.broadcast)
         self.answers = SimpleQueue[Answer]()
         self._notes = SimpleQueue[Note]()
         self.publish: Callable[[Event], None] | None = None
@@ -122,7 +122,7 @@ class SessionServer:
         self._state, self._reason, self._time = State.IDLE, "", 0.0
         self._noted = now()
         if owner is not None:
-            self._serve(owner, self.outbox.join(), lambda: self._hear(owner))
+            self._serve(owner, self.broadcast.join(), lambda: self._receive(owner))
 
     @property
     def attended(self) -> bool:
@@ -131,10 +131,10 @@ class SessionServer:
 
     def attach(self, connection: Connection, introduction: Attached) -> None:
         """Serve another client."""
-        queue = self.outbox.join(introduction, Control(not self.connected))
+        queue = self.broadcast.join(introduction, Control(not self.connected))
         self._attached.append(queue)
         self._attending.add(queue)
-        self._serve(connection, queue, lambda: self._hear_attached(connection, queue))
+        self._serve(connection, queue, lambda: self._receive_attached(connection, queue))
 
     def note(self, event: Event) -> None:
         """Store the state for the next beat, which reports it even if events are lost."""
@@ -151,15 +151,15 @@ class SessionServer:
 
     def close(self, last: FromSession, timeout: float) -> None:
         """Send the queued messages and then `last`; gives up after `timeout` seconds."""
-        self.outbox.put(last, always=True)
+        self.broadcast.put(last, always=True)
         end = now() + timeout
         for sent in tuple(self._sending):
             waiting.wait(sent, max(end - now(), 0.0))
 
-    def _serve(self, connection: Connection, queue: SendQueue, hear: Callable[[], None]) -> None:
+    def _serve(self, connection: Connection, queue: SendQueue, receive: Callable[[], None]) -> None:
         sent = threading.Event()
         self._sending.append(sent)
-        for name, work in (("send", lambda: self._send(connection, queue, sent)), ("hear", hear)):
+        for name, work in (("send", lambda: self._send(connection, queue, sent)), ("receive", receive)):
             threading.Thread(target=work, name=name, daemon=True).start()
 
     def _send(self, connection: Connection, queue: SendQueue, sent: threading.Event) -> None:
@@ -173,26 +173,26 @@ class SessionServer:
                 if now() - beaten >= BEAT and not over:
                     beaten = now()
                     connection.send(self._beat(queue))
-        self.outbox.leave(queue)
+        self.broadcast.leave(queue)
         sent.set()
 
     def _beat(self, queue: SendQueue) -> FromSession:
         quiet = now() - self._noted
         return Beat(self._state, self._reason, self._time, queue.lost_events, queue.lost_traces, quiet)
 
-    def _hear(self, owner: Connection) -> None:
+    def _receive(self, owner: Connection) -> None:
         try:
             while True:
                 if owner.poll(PATIENCE):
                     message = receive(owner)
                     self._find(present=True)
-                    self._heed(message)
+                    self._handle(message)
                 else:
-                    self._lose(f"the client has been silent for {PATIENCE:g} s")
+                    self._lose_client(f"the client has been silent for {PATIENCE:g} s")
         except (EOFError, OSError):
-            self._lose("the client has disconnected")
+            self._lose_client("the client has disconnected")
 
-    def _hear_attached(self, connection: Connection, queue: SendQueue) -> None:
+    def _receive_attached(self, connection: Connection, queue: SendQueue) -> None:
         try:
             with suppress(EOFError, OSError):
                 while True:
@@ -207,15 +207,15 @@ class SessionServer:
                     # while the owner is present, no other client controls the run, but every client may stop it
                     stops = isinstance(message, Ask) and message.end in ("abort", "halt")
                     if not self.connected or isinstance(message, Note) or stops:
-                        self._heed(message)
+                        self._handle(message)
         finally:
             self._attached.remove(queue)
             self._attending.discard(queue)
-            self.outbox.leave(queue)
+            self.broadcast.leave(queue)
             with suppress(OSError):
                 connection.close()
 
-    def _lose(self, why: str) -> None:
+    def _lose_client(self, why: str) -> None:
         self._find(present=False)
         self._lost(why)
 
@@ -226,7 +226,7 @@ class SessionServer:
             for queue in tuple(self._attached):
                 queue.put(Control(not present), always=True)
 
-    def _heed(self, message: object) -> None:
+    def _handle(self, message: object) -> None:
         match message:
             case Ask("halt" | "abort" | "stop" as end):
                 {"halt": self._requests.halt, "abort": self._requests.abort, "stop": self._requests.stop}[end]()
@@ -238,7 +238,7 @@ class SessionServer:
             case Note():
                 self._notes.put(message)
             case Leave():
-                self._lose("the client was closed")
+                self._lose_client("the client was closed")
             case _:
                 pass
 
@@ -255,7 +255,7 @@ class RemoteOperator:
     def confirm(self, request: str) -> bool:
         """Wait for the answer to a question; a request to end or the loss of the client counts as no."""
         self._number += 1
-        self._host.outbox.put(Question(self._number, request), always=True)
+        self._host.broadcast.put(Question(self._number, request), always=True)
         try:
             while self._requests.strongest is None and self._host.attended:
                 with suppress(Empty):
@@ -268,7 +268,7 @@ class RemoteOperator:
                 self._host.publish_notes()
             return False
         finally:
-            self._host.outbox.answered()
+            self._host.broadcast.discard_question()
 
 
 class Publisher:
@@ -283,7 +283,7 @@ class Publisher:
         """A `bench.progress.Progress` that sends a new phase immediately, and its parts at most once per `PERIOD`."""
         if phase != self._phase or now() - self._prepared >= PERIOD:
             self._phase, self._prepared = phase, now()
-            self._host.outbox.put(Preparing(phase, done, total))
+            self._host.broadcast.put(Preparing(phase, done, total))
 
     def opened(self, rig: Rig, publish: Callable[[Event], None], prepared: Prepared[Any] | None = None) -> None:
         """Start sending traces of the run that was `prepared` (None if its plan is not known). `publish` publishes an
@@ -297,28 +297,28 @@ class Publisher:
             forecast = prepared.forecast
             found = margins(forecast.demands, bounds(prepared.configuration))
             opened = replace(opened, duration=forecast.duration, prediction=prepared.prediction, margins=found)
-        self._host.outbox.put(opened, always=True)
+        self._host.broadcast.put(opened, always=True)
         self._host.inputs.watch(rig)
 
     def __call__(self, event: Event) -> None:
         self._host.note(event)
         self._host.publish_notes()
         if isinstance(event, Acquired):
-            if self._reduction is not None and self._host.outbox.heard:
+            if self._reduction is not None and self._host.broadcast.has_clients:
                 self._trace(self._reduction, event)
-            self._host.inputs.look_driven(event.time)
+            self._host.inputs.update_driven(event.time)
         elif not isinstance(event, ValuesReceived):
-            self._host.outbox.put(Published(event))
+            self._host.broadcast.put(Published(event))
             if isinstance(event, StateChanged):
                 self._host.inputs.look(event.time, at_once=True)
 
     def _trace(self, reduction: Reduction, event: Acquired) -> None:
         try:
-            self._host.outbox.put(reduction(event))
+            self._host.broadcast.put(reduction(event))
         except Exception as error:
             # an error of the display must not end a measurement
             self._reduction = None
-            self._host.outbox.put(Published(Warned(f"traces are no longer shown: {error}", time=event.time)))
+            self._host.broadcast.put(Published(Warned(f"traces are no longer shown: {error}", time=event.time)))
 
 
 def ended_message(result: SessionResult, out: Path) -> Ended:

@@ -175,7 +175,7 @@ def _summary(campaign: Campaign) -> list[Part]:
     parts: list[Part] = [
         *damage_notice(campaign),
         f"Tests: {what} on a two-storey frame with a rocking block{springs}. Bench: {backend}. Started "
-        f"{moment(record.start_time)}, {ended}; status: {record.status}.{_people(campaign)}",
+        f"{moment(record.start_time)}, {ended}; status: {record.status}.{_operator_text(campaign)}",
     ]
     if backend == "simulated":
         parts.append(
@@ -205,7 +205,7 @@ def _tested(campaign: Campaign) -> list[str]:
     return kinds
 
 
-def _people(campaign: Campaign) -> str:
+def _operator_text(campaign: Campaign) -> str:
     given = campaign.record.metadata
     words = (("Operator", given.get("operator")), ("Notes", given.get("notes")))
     return "".join(f" {name}: {text.rstrip('.')}." for name, text in words if text)

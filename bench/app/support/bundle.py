@@ -42,7 +42,7 @@ def write_bundle(path: Path, target: Path, *, anonymous: bool) -> tuple[str, ...
     }
     texts = {name: _text(part) for name, part in parts.items()}
     if anonymous:
-        names = _people(path)
+        names = _personal_names(path)
         texts = {name: anonymised(text, names) for name, text in texts.items()}
 
     def write(temporary: Path) -> None:
@@ -80,7 +80,7 @@ def _metadata(path: Path, name: str) -> str:
         return record.metadata[name] + "\n"
 
 
-def _people(path: Path) -> tuple[str, ...]:
+def _personal_names(path: Path) -> tuple[str, ...]:
     names = [str(Path.home())]
     try:
         with open_datafile(path) as record:

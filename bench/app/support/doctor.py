@@ -154,7 +154,7 @@ def usb_suspend(devices: Path = Path("/sys/bus/usb/devices"), system: str = sys.
     """Check whether USB devices are suspended when idle: NI's devices, and serial adapters."""
     item = "USB suspend"
     if system == "win32":
-        return _usb_suspend_of_windows(_answer("powercfg", "/query", "SCHEME_CURRENT", "SUB_USB", _SELECTIVE))
+        return _windows_usb_suspend(_answer("powercfg", "/query", "SCHEME_CURRENT", "SUB_USB", _SELECTIVE))
     suspended = [path.parent.parent for path in sorted(devices.glob("*/power/control")) if _read(path) == "auto"]
     ours = [device.name for device in suspended if _read(device / "idVendor") in _VENDORS]
     if not ours:
@@ -169,7 +169,7 @@ _VENDORS = {"3923": "NI", "0403": "FTDI", "10c4": "Silicon Labs", "067b": "Proli
 """Vendors of the USB devices of a bench, by identifier."""
 
 
-def _usb_suspend_of_windows(told: str) -> Finding:
+def _windows_usb_suspend(told: str) -> Finding:
     """Evaluate the output of powercfg: the last number is the setting on battery, the number before it the setting on
     mains power.
     """

@@ -164,7 +164,7 @@ class AnalogOutput:
     def verdict(self) -> None:
         dry, self._ran_dry = self._ran_dry, False
         if dry:
-            raise _dried_up()
+            raise _underflow()
 
     def put(self, volts: NDArray[np.float64]) -> None:
         """Output these values now, shape (channels,)."""
@@ -186,7 +186,7 @@ class AnalogOutput:
             with self._instant.next() as tick:
                 # atomic with respect to the plant, which must not receive samples after their due time
                 if self._playing and generation.dry(tick - 1):
-                    raise _dried_up(taken)
+                    raise _underflow(taken)
                 part = volts[taken : taken + max(generation.space(tick - 1), 0)]
                 generation.append(part)
             taken += part.shape[0]
@@ -232,10 +232,10 @@ class AnalogOutput:
 
     def _require_not_dry(self) -> None:
         if self._playing and self._generation is not None and self._generation.dry(self._instant.now):
-            raise _dried_up()
+            raise _underflow()
 
 
-def _dried_up(taken: int = 0) -> DaqmxFailure:
+def _underflow(taken: int = 0) -> DaqmxFailure:
     return DaqmxFailure(
         DAQmxErrors.GEN_STOPPED_TO_PREVENT_REGEN_OF_OLD_SAMPLES,
         "The generation has stopped to prevent the regeneration of old samples. Your application was unable to write"

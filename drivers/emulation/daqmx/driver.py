@@ -157,7 +157,7 @@ class Driver:
                 self.first_tick = tick
             _begin(task, job, tick)
             for other in self._tasks.values():
-                if other.job is not None and other.state is State.ARMED and _goes_with(other.job, job):
+                if other.job is not None and other.state is State.ARMED and _is_started_by(other.job, job):
                     _begin(other, other.job, tick)
 
     def _end(self, task: Task) -> None:
@@ -239,7 +239,7 @@ def _begin(task: Task, job: Job, tick: int) -> None:
     task.state = State.RUNNING
 
 
-def _goes_with(waiting: Job, fired: Job) -> bool:
+def _is_started_by(waiting: Job, fired: Job) -> bool:
     """Whether the starting job supplies all signals (trigger, clock) for which a job waits."""
     triggered = waiting.awaited is None or _same(waiting.awaited, fired.start_terminal)
     return triggered and (waiting.source is None or _same(waiting.source, fired.clock_terminal))

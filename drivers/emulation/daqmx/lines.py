@@ -11,9 +11,11 @@ from drivers.emulation.daqmx.errors import DaqmxFailure
 
 @dataclass(frozen=True)
 class Wires:
-    """Wiring by line name: receivers of an output line's level (`told`), sources of an input line's level (`shown`)."""
+    """Wiring by line name: receivers of an output line's level (`listeners`), sources of an input line's level
+    (`shown`).
+    """
 
-    told: Mapping[str, Callable[[bool], None]] = field(default_factory=dict[str, Callable[[bool], None]])
+    listeners: Mapping[str, Callable[[bool], None]] = field(default_factory=dict[str, Callable[[bool], None]])
     shown: Mapping[str, Callable[[], bool]] = field(default_factory=dict[str, Callable[[], bool]])
 
 
@@ -72,7 +74,7 @@ class Lines:
 
     def _set(self, line: str, high: bool) -> None:
         (self._high.add if high else self._high.discard)(line)
-        if (told := self._wires.told.get(line)) is not None:
+        if (told := self._wires.listeners.get(line)) is not None:
             told(high)
 
 

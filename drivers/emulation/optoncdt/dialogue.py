@@ -100,25 +100,25 @@ class Dialogue:
     def __init__(self, sensor: Sensor, actions: Actions, rates: tuple[float, ...]) -> None:
         self._sensor, self._actions = sensor, actions
         self._settings = commands(rates)
-        self._heard = b""
+        self._received = b""
         self._waiting: Mastering | None = None
 
-    def hear(self, received: bytes, now: float) -> bytes:
+    def receive(self, received: bytes, now: float) -> bytes:
         """Output due at the host time `now` [s], after `received` has arrived.
 
         A command ends with a line feed, with or without carriage return; input during start-up is ignored.
         """
         if now < self._sensor.ready:
-            self._heard, self._waiting = b"", None
+            self._received, self._waiting = b"", None
             return b""
-        self._heard += received
+        self._received += received
         said = self._finish(now)
-        while self._waiting is None and b"\n" in self._heard and now >= self._sensor.ready:
-            line, self._heard = self._heard.split(b"\n", 1)
+        while self._waiting is None and b"\n" in self._received and now >= self._sensor.ready:
+            line, self._received = self._received.split(b"\n", 1)
             said += self._answer(line.rstrip(b"\r"), now)
-        if b"\n" not in self._heard:
+        if b"\n" not in self._received:
             # keep enough of an unterminated command for it to be rejected as too long
-            self._heard = self._heard[: _LONGEST + 1]
+            self._received = self._received[: _LONGEST + 1]
         return said
 
     def _answer(self, line: bytes, now: float) -> bytes:
@@ -127,7 +127,7 @@ class Dialogue:
         try:
             if len(text) > _LONGEST:
                 raise Refusal(214, "Entered command is too long to be processed")
-            answer = self._obey(text, now)
+            answer = self._execute(text, now)
         except Refusal as refusal:
             answer = [str(refusal)]
         if isinstance(answer, Mastering):
@@ -148,7 +148,7 @@ class Dialogue:
         self._waiting = None
         return _reply(answer)
 
-    def _obey(self, text: str, now: float) -> list[str] | Mastering:
+    def _execute(self, text: str, now: float) -> list[str] | Mastering:
         """Execute the command. Raises Refusal."""
         try:
             words = shlex.split(text.upper())

@@ -40,7 +40,7 @@ class Line:
 
     def carried(self, stream: Bytes, answer: bytes, now: float) -> Bytes:
         """Bytes that reach the client: the values of `stream`, with `answer` inserted between two of them."""
-        sent = self._woven(stream, answer)
+        sent = self._with_answer(stream, answer)
         if now < self.silent_until:
             return sent[:0]
         if self.garbage:
@@ -60,7 +60,7 @@ class Line:
         noise = self._random.integers(0, 256, round(sent.size * min(1.0, read_at / baud)), dtype=np.uint8)
         return np.where(noise == _HYPHEN, np.uint8(0), noise)
 
-    def _woven(self, stream: Bytes, answer: bytes) -> Bytes:
+    def _with_answer(self, stream: Bytes, answer: bytes) -> Bytes:
         if not answer:
             return stream
         place = WORD * int(self._random.integers(0, stream.size // WORD + 1))
@@ -216,7 +216,7 @@ class EmulatedLaser:
             # at the wrong rate no command is recognised, and the received bytes corrupt the next one
             received = b"\xff" * len(received)
         stream = self._sensor.stream(now)
-        answer = self._dialogue.hear(received, now)
+        answer = self._dialogue.receive(received, now)
         sent = self._line.carried(stream, answer, now)
         if connected and sent.size:
             self._terminal.write((sent if read_at == baud else self._line.misread(sent, baud, read_at)).tobytes())

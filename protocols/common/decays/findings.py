@@ -37,7 +37,7 @@ def fit_finished(decay: Decay, name: str) -> FitFinished:
     fit, stretch = decay.fit, decay.fit.stretch
     columns = {"time": Series(stretch.time, "s", "time since the start of the recording")}
     for row, laser in enumerate(STOREYS):
-        measured, fitted = stretch.seen[row], fit.fitted[row]
+        measured, fitted = stretch.readings[row], fit.fitted[row]
         columns[laser] = Series(measured, "m", f"signal of {laser}, averaged over the time step")
         columns[f"{laser}_fitted"] = Series(fitted, "m", f"signal of {laser} computed with the fitted frame")
         columns[f"{laser}_residual"] = Series(measured - fitted, "m", "measured minus fitted")
@@ -58,8 +58,8 @@ def frame_findings(result: FrameResult, known: Identified) -> tuple[list[Finding
     """
     indices = list(FOUND.values())
     inner = result.frame.covariance[np.ix_(indices, indices)]
-    across = result.mass_shift[indices] @ result.weighed
-    whole = np.block([[inner, across], [across.T, result.weighed]])
+    across = result.mass_shift[indices] @ result.masses_covariance
+    whole = np.block([[inner, across], [across.T, result.masses_covariance]])
     uncertainties = np.sqrt(np.diag(whole))
     names, values = [*FOUND, "m1", "m2"], [*result.frame.values[indices].tolist(), *result.masses]
     date = datetime.now(UTC).replace(microsecond=0)

@@ -25,17 +25,17 @@ class FrameResult:
     """Result of one or several decays.
 
     `frame` contains the combined quantities, `slopes` the combined changes of the damping with amplitude [1/m].
-    `masses` [kg] are the weighed masses, `weighed` [kg2], shape (2, 2), is their covariance. `mass_shift`, shape (8,
-    2), is the sensitivity of the quantities to the masses, `time_shift`, shape (8,), is the sensitivity to the timebase
-    multiplied by the timebase's standard uncertainty. `parts` holds the standard uncertainties, shape (8,), by
-    contribution.
+    `masses` [kg] are the weighed masses, `masses_covariance` [kg2], shape (2, 2), is their covariance. `mass_shift`,
+    shape (8, 2), is the sensitivity of the quantities to the masses, `time_shift`, shape (8,), is the sensitivity to
+    the timebase multiplied by the timebase's standard uncertainty. `parts` holds the standard uncertainties, shape
+    (8,), by contribution.
     """
 
     decays: tuple[Decay, ...]
     frame: Combined
     slopes: Combined
     masses: tuple[float, float]
-    weighed: Array
+    masses_covariance: Array
     mass_shift: Array
     time_shift: Array
     parts: dict[str, Array]
@@ -51,7 +51,7 @@ class FrameResult:
     def shared(self) -> Array:
         """Covariance of both masses [kg2] and of the timebase in units of its standard uncertainty, shape (3, 3)."""
         whole = np.eye(3)
-        whole[:2, :2] = self.weighed
+        whole[:2, :2] = self.masses_covariance
         return whole
 
     @property
@@ -70,7 +70,7 @@ class FrameResult:
         return np.abs(self.slopes.values) > SIGNIFICANT * self.slope_uncertainty
 
 
-def frame_result(decays: Sequence[Decay], masses: tuple[float, float], weighed: Array) -> FrameResult:
+def frame_result(decays: Sequence[Decay], masses: tuple[float, float], masses_covariance: Array) -> FrameResult:
     """Combine the decays of one frame."""
     frame = combine(
         [one.quantities for one in decays],
@@ -86,7 +86,7 @@ def frame_result(decays: Sequence[Decay], masses: tuple[float, float], weighed: 
     parts = {name: _part(name, decays, frame) for name in names} | {"scatter": frame.scatter}
     shift = np.mean([one.uncertainty.mass_shift for one in decays], axis=0)
     late = np.mean([one.uncertainty.time_shift for one in decays], axis=0)
-    return FrameResult(tuple(decays), frame, slopes, masses, weighed, shift, late, parts)
+    return FrameResult(tuple(decays), frame, slopes, masses, masses_covariance, shift, late, parts)
 
 
 def decay_point(result: FrameResult, number: int) -> DecayPoint:

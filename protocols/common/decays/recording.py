@@ -231,7 +231,9 @@ def repeat_decays(
                 continue
             decays.append(decay)
             yield Publish(fit_finished(decay, f"{name} {number}"))
-            yield Publish(PointFinished(point(frame_result([decay], setting.masses, setting.weighed), number)))
+            yield Publish(
+                PointFinished(point(frame_result([decay], setting.masses, setting.masses_covariance), number))
+            )
             break
         pace.finish(begun, planned)
         yield Publish(pace.progress(f"finished {name} {number} of {parameters.repeats}"))
@@ -249,7 +251,7 @@ def fit_setting(parameters: DecayParameters, configuration: BenchConfiguration) 
         on_table=configuration.laser_reference == "table",
         accuracy=configuration.analysis,
         masses=(frame.m1, frame.m2),
-        weighed=mass_covariance(parameters, configuration.identified),
+        masses_covariance=mass_covariance(parameters, configuration.identified),
     )
 
 

@@ -65,7 +65,7 @@ class IdentifyParameters(Parameters):
     phase_seed: int = quantity(1, "", "random seed for the phases", ge=0, lt=2**32)
 
     @model_validator(mode="after")
-    def _a_band(self) -> "IdentifyParameters":
+    def _check_band(self) -> "IdentifyParameters":
         if self.band_low is not None and self.band_high is not None and self.band_low >= self.band_high:
             raise InvalidInput("band_high", self.band_high, f"it must be above band_low = {self.band_low:g} Hz")
         return self

@@ -30,8 +30,8 @@ from protocols.common.identification.signal import (
     Grid,
     Planned,
     drive_for,
+    measured_peak,
     mounted_name,
-    seen_peak,
     specimen_of,
 )
 from sim.specimen import Specimen
@@ -122,7 +122,7 @@ def probed_response(motion: Complex, grid: Grid, rules: Rules) -> Generator[Step
     Raises Unmeasurable if the table does not respond, or does not reach this motion.
     """
     short = grid.shortened()
-    level, reached = seen_peak(motion, short, rules.knee), 0.0
+    level, reached = measured_peak(motion, short, rules.knee), 0.0
     # the first drive has the spectrum of the acceleration, since the response is unknown
     drive = motion * (PROBE / _peak(motion, short))
     for probe in range(1, _MOST + 1):
@@ -142,7 +142,7 @@ def probed_response(motion: Complex, grid: Grid, rules: Rules) -> Generator[Step
             drive = GROWTH * drive
             continue
         response = moved.mean(axis=0) / volts.mean(axis=0)
-        reached = seen_peak(moved.mean(axis=0), short, rules.knee)
+        reached = measured_peak(moved.mean(axis=0), short, rules.knee)
         if reached >= REACHED * level:
             return response
         drive = drive_for(motion, response, short, rules.knee) * min(1.0, GROWTH * reached / level)
@@ -220,7 +220,7 @@ def identified(
         rules.remains((parameters.realisations - number) * each)
         yield Publish(rules.progress(f"multisine {number} of {parameters.realisations} finished"))
     model, agreement = _identified(records, found, specimen)
-    yield from _told(model, agreement)
+    yield from _publish_model(model, agreement)
     return model
 
 
@@ -267,7 +267,7 @@ def _identified(
     return model, sensor_agreement(*each)
 
 
-def _told(model: TableModel, agreement: tuple[float, float]) -> Generator[Step, Outcome, None]:
+def _publish_model(model: TableModel, agreement: tuple[float, float]) -> Generator[Step, Outcome, None]:
     low, high = model.band
     text = f"{model.specimen}, {low:g} to {high:g} Hz, {len(model.frequency)} lines, {model.level:.3g} m/s2 rms"
     columns = ("frequency", "real", "imaginary", "uncertainty", "distortion", "coherence", "noise")

@@ -100,7 +100,7 @@ def band(parameters: IdentifyParameters, configuration: BenchConfiguration) -> t
     return parameters.band_low or low / REACH, parameters.band_high or high * REACH
 
 
-def wanted_motions(parameters: IdentifyParameters, lines: Grid) -> list[Complex]:
+def required_motions(parameters: IdentifyParameters, lines: Grid) -> list[Complex]:
     """Complex amplitudes of the table's acceleration at the lines for each realisation, with a peak of 1 m/s2."""
     frequency = lines.frequency
     amplitudes = drive_amplitudes(frequency, np.ones(frequency.size), "displacement", parameters.corner)
@@ -124,10 +124,10 @@ def drive_for(motion: Complex, response: Complex, grid: Grid, knee: float) -> Co
     if below.any():
         size = np.where(frequency > knee, np.sqrt(np.mean(size[below] ** 2)), size)
     drive = motion / (size * np.exp(1j * np.angle(response)))
-    return drive * (seen_peak(motion, grid, knee) / seen_peak(drive * response, grid, knee))
+    return drive * (measured_peak(motion, grid, knee) / measured_peak(drive * response, grid, knee))
 
 
-def seen_peak(motion: Complex, grid: Grid, knee: float) -> float:
+def measured_peak(motion: Complex, grid: Grid, knee: float) -> float:
     """Peak [m/s2] of an acceleration, from its lines up to half the `knee` [Hz], which no filter attenuates."""
     seen = grid.frequency <= 0.5 * knee
     seen = seen if seen.any() else np.ones(seen.shape, np.bool_)
@@ -150,13 +150,13 @@ BLOCK_SHARE = 0.6
 class Planned:
     """Planned multisines: acceleration spectra `motions` at the lines of `grid`, with a largest peak of `level` [m/s2].
 
-    `asked` holds the largest demands of the motions. `binds` names the limit that determines the level.
+    `demands` holds the largest demands of the motions. `binds` names the limit that determines the level.
     """
 
     grid: Grid
     motions: tuple[Complex, ...]
     level: float
-    asked: dict[str, float]
+    demands: dict[str, float]
     binds: str
 
 
@@ -179,8 +179,8 @@ def planned(parameters: IdentifyParameters, configuration: BenchConfiguration) -
     """
     specimen = specimen_of(parameters, configuration)
     lines = grid(parameters, configuration, specimen)
-    unit = wanted_motions(parameters, lines)
-    each = [_asked(lines, motion, specimen, configuration) for motion in unit]
+    unit = required_motions(parameters, lines)
+    each = [_motion_demands(lines, motion, specimen, configuration) for motion in unit]
     asked = {name: max(one[name] for one in each) for name in each[0]}
     limits = {name: SHARE * bound.limit for name, bound in bounds(configuration).items()} | {RESTING: BLOCK_SHARE}
     allowed = {name: limits[name] / value for name, value in asked.items() if value > 0.0}
@@ -192,7 +192,9 @@ def planned(parameters: IdentifyParameters, configuration: BenchConfiguration) -
     return Planned(lines, tuple(level * motion for motion in unit), level, scaled, binds)
 
 
-def _asked(lines: Grid, motion: Complex, specimen: Specimen, configuration: BenchConfiguration) -> dict[str, float]:
+def _motion_demands(
+    lines: Grid, motion: Complex, specimen: Specimen, configuration: BenchConfiguration
+) -> dict[str, float]:
     found = resting_demands(lines.record(motion), lines.sample_rate, specimen, configuration)
     return found | _drive(lines, motion, specimen, configuration)
 

@@ -130,7 +130,7 @@ def test_the_stated_uncertainty_is_the_scatter_of_many_recordings() -> None:
 def test_weighing_errors_move_the_stiffness_as_stated() -> None:
     signals, off = recording(constants()), 1e-3
     errors = np.diag([0.0004**2, 0.0007**2])
-    decay = pulsed_decay(signals, setting(weighed=errors), QUIET, BEGIN)
+    decay = pulsed_decay(signals, setting(masses_covariance=errors), QUIET, BEGIN)
     for which in range(2):
         masses = [FRAME.m1, FRAME.m2]
         masses[which] += off

@@ -179,10 +179,10 @@ def test_a_delay_that_falls_back_moves_r_as_stated() -> None:
     random, shifts = np.random.default_rng(5), []
     for _ in range(16):
         rate, phase = random.uniform(-0.2, 0.2), random.uniform()
-        times = plain.seen.times
-        late = np.interp(times - 2.5e-4 * ((rate * times + phase) % 1.0), times, plain.seen.displacement)
+        times = plain.recording.times
+        late = np.interp(times - 2.5e-4 * ((rate * times + phase) % 1.0), times, plain.recording.displacement)
         shifts.append(
-            analyse_tilt(replace(plain.seen, displacement=late), SPECIMEN, LEAST).fit.values[R] - true.restitution
+            analyse_tilt(replace(plain.recording, displacement=late), SPECIMEN, LEAST).fit.values[R] - true.restitution
         )
     assert np.sqrt(np.mean(np.square(shifts))) / stated == pytest.approx(1.0, abs=0.4)
 

@@ -11,7 +11,7 @@ import pytest
 from bench.app.cli import closing
 from bench.app.support import awake as module
 from bench.app.support.awake import CONTINUOUS, SYSTEM_REQUIRED, awake
-from bench.app.support.doctor import Health, _usb_suspend_of_windows, sleep, usb_suspend
+from bench.app.support.doctor import Health, _windows_usb_suspend, sleep, usb_suspend
 
 POWERCFG = """
 Power Setting GUID: 48e6b7a6-50f5-4782-a5d4-53bb8f07e226  (USB selective suspend setting)
@@ -66,8 +66,8 @@ def test_a_closed_console_interrupts_and_waits(monkeypatch: pytest.MonkeyPatch) 
 
 @pytest.mark.parametrize(("mains", "battery", "health"), [(0, 0, "good"), (1, 0, "bad"), (0, 1, "bad")])
 def test_the_answer_of_powercfg(mains: int, battery: int, health: str) -> None:
-    assert _usb_suspend_of_windows(POWERCFG.format(mains=mains, battery=battery)).health == health
-    assert _usb_suspend_of_windows("").health is Health.UNKNOWN
+    assert _windows_usb_suspend(POWERCFG.format(mains=mains, battery=battery)).health == health
+    assert _windows_usb_suspend("").health is Health.UNKNOWN
 
 
 def test_a_suspended_device_of_the_bench_is_named(tmp_path: Path) -> None:

@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bench.control.oscillator import DriveCalibration, Leg, Oscillator, program, sweeps
+from bench.control.oscillator import DriveCalibration, Oscillator, Segment, program, sweeps
 
 RATE = 1000.0
-LEGS = (Leg(2.0, 1.2, 22.0), Leg(3.0, 1.2, 16.0), Leg(0.5, 0.4, 16.0))
+LEGS = (Segment(2.0, 1.2, 22.0), Segment(3.0, 1.2, 16.0), Segment(0.5, 0.4, 16.0))
 
 
 def _oscillator() -> Oscillator:
@@ -75,7 +75,7 @@ def test_harmonics_are_played_in_the_fundamentals_phase_through_the_response_at_
     calibration = DriveCalibration((10.0, 20.0, 40.0), (2.0j, 1.0 + 1.0j, 4.0))
     oscillator = Oscillator(RATE)
     oscillator.use(calibration)
-    oscillator.follow(sweeps((Leg(1.0, 3.0, 16.0),), 0.0, 16.0)[0])
+    oscillator.follow(sweeps((Segment(1.0, 3.0, 16.0),), 0.0, 16.0)[0])
     oscillator.next(1000)
     oscillator.trim((0.9 + 0.1j, 0.05, 0.02j))
     oscillator.next(400)
@@ -92,7 +92,7 @@ def test_a_trim_is_given_up_when_the_drive_moves_on() -> None:
     oscillator.trim((1.1, 0.1, 0.1j))
     oscillator.next(400)
     assert np.abs(_held(oscillator)) == pytest.approx([0.22, 0.02, 0.02, 0.0], abs=1e-9)
-    oscillator.follow(sweeps((Leg(1.0, 0.4, 16.0),), oscillator.amplitude, oscillator.omega)[0])
+    oscillator.follow(sweeps((Segment(1.0, 0.4, 16.0),), oscillator.amplitude, oscillator.omega)[0])
     before = oscillator.next(1000)
     assert np.abs(_held(oscillator)) == pytest.approx([0.2, 0.0, 0.0, 0.0], abs=1e-9)
     assert np.abs(np.diff(before)).max() < 2.0 * 0.22 * 16.0 / RATE
@@ -112,7 +112,7 @@ def test_a_trim_does_not_depend_on_the_size_of_the_blocks(sizes: list[int]) -> N
 
 def test_moving_before_calibration_is_refused() -> None:
     oscillator = Oscillator(RATE)
-    oscillator.follow(sweeps((Leg(1.0, 1.0, 16.0),), 0.0, 16.0)[0])
+    oscillator.follow(sweeps((Segment(1.0, 1.0, 16.0),), 0.0, 16.0)[0])
     with pytest.raises(RuntimeError, match="drive must be calibrated"):
         oscillator.next(10)
 
@@ -125,7 +125,7 @@ def test_amplitudes_of_a_held_sine_that_are_kept_are_those_of_the_formula_bit_fo
         DriveCalibration((5.0, 20.0, 90.0), (1.1 + 0.3j, 2.0 - 0.1j, 0.7j)),
     )
     oscillator.use(calibrations[0])
-    oscillator.follow(sweeps((Leg(0.1, 1.3, 14.0),), 0.0, 14.0)[0])
+    oscillator.follow(sweeps((Segment(0.1, 1.3, 14.0),), 0.0, 14.0)[0])
     oscillator.next(200)
     oscillator.trim((1.0, 0.0, 0.02 - 0.03j, 0.0, 0.01j))
     settled = round(2.0 * np.pi / 14.0 * rate)
@@ -155,7 +155,7 @@ def test_a_held_sine_looks_its_response_up_once() -> None:
     looked_up: list[int] = []
     oscillator = Oscillator(2000.0)
     oscillator.use(Counted((1.0,), (1.0,)))
-    oscillator.follow(sweeps((Leg(0.1, 1.3, 14.0),), 0.0, 14.0)[0])
+    oscillator.follow(sweeps((Segment(0.1, 1.3, 14.0),), 0.0, 14.0)[0])
     oscillator.next(200)
     looked_up.clear()
     for _ in range(50):

@@ -310,7 +310,7 @@ def test_the_largest_share_that_fits() -> None:
     limits = Limits(displacement=0.5)
     verdict = fitting(envelope(still), envelope(step), limits, margin=1.0)
     assert (verdict.share, verdict.binds) == (0.25, "displacement")
-    assert (verdict.wanted, verdict.allowed) == (2.0, 0.5)
+    assert (verdict.demand, verdict.allowed) == (2.0, 0.5)
     # room of 0.1 where the step is up by 1; 0.9 where it is down by 2
     assert fitting(envelope(np.full(4, 0.4)), envelope(step), limits, margin=1.0).share == pytest.approx(0.1)
     assert fitting(envelope(np.full(4, 0.6)), envelope(step), limits, margin=1.0).share == 0.0

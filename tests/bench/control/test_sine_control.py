@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from bench.analysis.cycles import HARMONICS
 from bench.analysis.signals import SignalMap
-from bench.control.oscillator import DriveCalibration, Leg
+from bench.control.oscillator import DriveCalibration, Segment
 from bench.control.sine import Sine, SineControl, SineResponse, Tolerance
 from bench.engine.engine import Engine
 from bench.engine.interface import EventStream, Requests, Unattended
@@ -98,7 +98,7 @@ def _believed(payload: float, wrong: float = 1.0, lag: float = 0.0, only_above: 
 
 
 def _hold(
-    beta: float | None, sine: Sine, legs: Sequence[Leg], looks: int, seed: int = 1, lead: int = 200
+    beta: float | None, sine: Sine, segments: Sequence[Segment], looks: int, seed: int = 1, lead: int = 200
 ) -> tuple[list[Complex], list[int]]:
     """The true shares in the looks at a dwell under control, and how many updates came before each."""
     bench, shares, updates = Bench(seed, lead), list[Complex](), list[int]()
@@ -111,7 +111,7 @@ def _hold(
             yield OperatorAction(OperatorTask.MOUNT_SPRING, Specimen().coupled(beta), "mount the spring")
         yield Arm(2.0)
         yield Calibrate(sine.calibration)
-        yield Sweep(tuple(legs))
+        yield Sweep(tuple(segments))
         control, turn, truth, done = SineControl(HARMONICS, AIMED), None, 0j, 0
         for _ in range(looks):
             outcome = yield Dwell(LOOK)
@@ -147,7 +147,7 @@ def _assert_as_asked(shares: Complex) -> None:
 @pytest.mark.parametrize(("omega", "wrong"), [(12.5, 1.2), (16.0, 0.8), (20.0, 1.2)])
 def test_the_bare_frame_is_moved_as_asked_within_six_updates(omega: float, wrong: float) -> None:
     sine = Sine(omega, AMPLITUDE, _believed(2.1, wrong))
-    shares, updates = _hold(None, sine, (Leg(4.0, AMPLITUDE, omega),), UPDATES + 3)
+    shares, updates = _hold(None, sine, (Segment(4.0, AMPLITUDE, omega),), UPDATES + 3)
     assert abs(_errors(shares[0])[0]) > 0.08
     assert updates[UPDATES] <= UPDATES
     for held in shares[UPDATES:]:
@@ -169,10 +169,10 @@ STARTS = {
 """Ramps that lead to the stable rocking motions of the campaign: length [s] and frequency [rad/s]."""
 
 
-def _start(beta: float, omega: float) -> tuple[Leg, ...]:
+def _start(beta: float, omega: float) -> tuple[Segment, ...]:
     duration, begin = STARTS[beta, omega]
     strong = 1.2 * AMPLITUDE
-    return Leg(duration, strong, begin), Leg(begin - omega, strong, omega), Leg(6.0, AMPLITUDE, omega)
+    return Segment(duration, strong, begin), Segment(begin - omega, strong, omega), Segment(6.0, AMPLITUDE, omega)
 
 
 FEW = ((0.25, 12.5), (0.64, 20.0), (0.97, 17.5))
@@ -208,7 +208,7 @@ def test_harmonics_are_cancelled_where_their_response_is_misjudged(
 def test_a_long_wait_between_command_and_motion_is_no_trouble() -> None:
     """With two seconds of drive waiting in the rig, four cycles pass before a step is seen."""
     sine = Sine(16.0, AMPLITUDE, _believed(2.1, 0.9))
-    shares, updates = _hold(None, sine, (Leg(4.0, AMPLITUDE, 16.0),), 16, lead=4000)
+    shares, updates = _hold(None, sine, (Segment(4.0, AMPLITUDE, 16.0),), 16, lead=4000)
     assert np.abs([held[0] for held in shares]).max() < 1.15
     assert updates[-1] < 16
     _assert_as_asked(shares[-1])

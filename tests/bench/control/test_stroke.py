@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from bench.analysis.response_spectrum import pseudo_acceleration
-from bench.analysis.table_motion import at_rest_in_the_end, table_motion
+from bench.analysis.table_motion import table_motion, with_final_rest
 from bench.config.model import BenchConfiguration
 from bench.control import least_change
 from bench.control.least_change import Infeasible, SineModes, oscillator_peak, shortest
@@ -37,7 +37,7 @@ def ground_motion(seed: int, duration: float = 30.0, dt: float = 0.005, low: flo
     motion *= (t / 6.0) ** 2 * np.exp(2.0 - t / 3.0) * np.clip(t / 0.5, 0.0, 1.0) * np.clip((t[-1] - t) / 0.5, 0.0, 1.0)
     passed = high_passed(motion, dt, 0.12)
     kept = passed.acceleration[max(passed.lead - 200, 0) : passed.lead + n + 200]
-    return at_rest_in_the_end(3.0 * kept / np.abs(kept).max(), dt)
+    return with_final_rest(3.0 * kept / np.abs(kept).max(), dt)
 
 
 def test_straight_lines_are_integrated_exactly() -> None:
@@ -49,7 +49,7 @@ def test_straight_lines_are_integrated_exactly() -> None:
 
 def test_a_record_is_brought_to_rest_by_its_two_slowest_sines() -> None:
     a = np.random.default_rng(5).standard_normal(4001)
-    closed = at_rest_in_the_end(a, 0.005)
+    closed = with_final_rest(a, 0.005)
     motion = table_motion(closed, 0.005)
     assert abs(motion.velocity[-1]) < 1e-14 * motion.peak_velocity * a.size
     assert abs(motion.displacement[-1]) < 1e-14 * motion.peak_displacement * a.size

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from bench.control.oscillator import DriveCalibration, Leg
+from bench.control.oscillator import DriveCalibration, Segment
 from bench.engine.steps import AcquireAtRest, Arm, Calibrate, Dwell, Plan, RampOut, RestSamples, Sweep
 from bench.events import Acquired, Event, LimitExceeded, SensorsAligned, State, Warned
 from bench.testing.loopback import LoopbackRig
@@ -24,7 +24,7 @@ def _plan(*steps: object, outcomes: list[object] | None = None) -> Plan:
             outcomes.append(outcome)
 
 
-TEST = (Arm(0.5), Calibrate(DriveCalibration.flat(1.0)), Sweep((Leg(1.0, 1.0, OMEGA),)), Dwell(2), RampOut())
+TEST = (Arm(0.5), Calibrate(DriveCalibration.flat(1.0)), Sweep((Segment(1.0, 1.0, OMEGA),)), Dwell(2), RampOut())
 
 
 def _heard(rig: LoopbackRig) -> tuple[Bench, RestSamples]:

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bench.control.oscillator import DriveCalibration, Leg
+from bench.control.oscillator import DriveCalibration, Segment
 from bench.engine.engine import Ending
 from bench.engine.output import TRANSITIONS, StateMachine
 from bench.engine.steps import (
@@ -51,7 +51,7 @@ RUN: tuple[Step, ...] = (
     MOUNT,
     Arm(0.5),
     Calibrate(DriveCalibration.flat(1.0)),
-    Sweep((Leg(2.0, 1.0, OMEGA),)),
+    Sweep((Segment(2.0, 1.0, OMEGA),)),
     Dwell(6),
     RampOut(),
 )
@@ -402,7 +402,7 @@ def test_illegal_transitions_are_refused() -> None:
 @settings(max_examples=30, deadline=None)
 @given(
     st.lists(
-        st.sampled_from([Dwell(2), SetHarmonics((1.2,)), SetHarmonics((0.5, 0.1j)), Sweep((Leg(0.5, 2.0, 20.0),))]),
+        st.sampled_from([Dwell(2), SetHarmonics((1.2,)), SetHarmonics((0.5, 0.1j)), Sweep((Segment(0.5, 2.0, 20.0),))]),
         max_size=6,
     ),
     st.integers(0, 60),

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from bench.control.oscillator import DriveCalibration, Leg
+from bench.control.oscillator import DriveCalibration, Segment
 from bench.engine.interface import Ending
 from bench.engine.steps import (
     Arm,
@@ -150,10 +150,10 @@ def test_what_cannot_be_played_is_refused_before_a_sample_of_it_moves(volts: Arr
 
 
 def test_a_play_on_a_sine_or_on_a_bench_at_rest_is_refused() -> None:
-    sine = (Calibrate(DriveCalibration.flat(1.0)), Sweep((Leg(0.5, 0.5, 16.0),)))
+    sine = (Calibrate(DriveCalibration.flat(1.0)), Sweep((Segment(0.5, 0.5, 16.0),)))
     ending, _ = Bench(rig_that()).run(Arm(0.2), *sine, Play(burst()))
     assert "ramp the sine to zero" in ending.reason
-    silent = Sweep((Leg(0.5, 0.0, 16.0),))
+    silent = Sweep((Segment(0.5, 0.0, 16.0),))
     assert Bench(rig_that()).run(Arm(0.2), *sine, silent, Play(burst()), RampOut())[0].status == "completed"
     ending, _ = Bench(rig_that()).run(Play(burst()))
     assert ending.status == "failed"
@@ -246,7 +246,7 @@ def test_a_fall_comes_with_the_signals_so_far_and_the_drive_goes_on_until_it_is_
     assert rig.played[-1] == 0.0
 
 
-@pytest.mark.parametrize("then", [Play(burst()), Sweep((Leg(1.0, 0.5, 16.0),))])
+@pytest.mark.parametrize("then", [Play(burst()), Sweep((Segment(1.0, 0.5, 16.0),))])
 def test_nothing_else_is_driven_after_a_fall_before_the_ramp(then: Step) -> None:
     mount = OperatorAction(OperatorTask.MOUNT_SPRING, Specimen().coupled(0.4), "mount the spring")
     bench = Bench(_Falls())

@@ -12,7 +12,7 @@ import pytest
 from bench.app import preflight
 from bench.app.preflight import bytes_per_second, compile_run, disk_space, plan_hash
 from bench.config.model import BenchConfiguration
-from bench.control.oscillator import Leg, program
+from bench.control.oscillator import Segment, program
 from bench.datafile import tables
 from bench.guard.limits import Limits
 from bench.guard.shaker import ShakerModel
@@ -26,7 +26,7 @@ from sim.shaker import Shaker
 from sim.virtual_bench import VirtualBenchParameters
 
 CONFIGURATION = BenchConfiguration()
-STAGE = Stage("hold", (Leg(2.0, 1.0, 10.0),), 0.5)
+STAGE = Stage("hold", (Segment(2.0, 1.0, 10.0),), 0.5)
 
 
 class Silent(Prepared[HarmonicParameters]):
@@ -142,7 +142,7 @@ def test_a_sine_asks_what_the_closed_forms_say() -> None:
     """2 m/s2 at 10 rad/s: 20 mm, 0.2 m/s; 60 kg on 500 N/m by 50 N/A; shaker of the default parameters."""
     shaker, mass = Shaker(friction=0.0), 10.0
     found = load(
-        program([Leg(4.0, 2.0, 10.0), Leg(20.0, 2.0, 10.0)]),
+        program([Segment(4.0, 2.0, 10.0), Segment(20.0, 2.0, 10.0)]),
         0.0,
         1e4,
         payload=mass,
@@ -168,8 +168,8 @@ def test_a_sine_asks_what_the_closed_forms_say() -> None:
 
 
 def test_what_comes_before_does_not_count_and_a_chirp_goes_through_its_slowest_sine() -> None:
-    legs = [Leg(1.0, 5.0, 20.0), Leg(1.0, 1.0, 20.0), Leg(5.0, 1.0, 10.0)]
-    found = load(program(legs), 2.0, 0.0, payload=0.0, shaker=None, response=None, heating_time=60.0)
+    segments = [Segment(1.0, 5.0, 20.0), Segment(1.0, 1.0, 20.0), Segment(5.0, 1.0, 10.0)]
+    found = load(program(segments), 2.0, 0.0, payload=0.0, shaker=None, response=None, heating_time=60.0)
     assert found == pytest.approx({"displacement": 0.01, "velocity": 0.1, "acceleration": 1.0}, rel=0.02)
 
 
@@ -192,7 +192,7 @@ def _hash(**changes: object) -> str:
         {"configuration": BenchConfiguration(limits=Limits(drift=0.081))},
         {"version": "1.1"},
         {"forecast": Forecast((_demand("drift", 0.0500001),), (STAGE,), 100.0)},
-        {"forecast": Forecast((_demand("drift", 0.05),), (Stage("hold", (Leg(2.0, 1.0, 10.1),), 0.5),), 100.0)},
+        {"forecast": Forecast((_demand("drift", 0.05),), (Stage("hold", (Segment(2.0, 1.0, 10.1),), 0.5),), 100.0)},
         {"forecast": Forecast((_demand("drift", 0.05),), (STAGE,), 101.0)},
     ],
 )

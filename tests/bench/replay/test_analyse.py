@@ -13,7 +13,7 @@ import pytest
 from bench.app.cli.main import main
 from bench.config.model import BenchConfiguration
 from bench.config.sections import Acquisition, Simulation
-from bench.control.oscillator import Leg
+from bench.control.oscillator import Segment
 from bench.control.starts import Start
 from bench.datafile.reader import open_datafile
 from bench.guard.limits import Limits
@@ -48,9 +48,9 @@ ASKED = HarmonicParameters(
 
 def _planned(_specimen: Specimen, omega: float, amplitude: float, *_: object) -> tuple[Start, ...]:
     """A start that topples the block, and a ramp that leaves it at rest: good starts take long to find."""
-    shaken = Leg(2.0, 2.9 * amplitude, 12.0)
-    violent = Start("violent", (shaken, replace(shaken, duration=3.0), Leg(2.0, amplitude, omega)), 0.1)
-    return violent, Start("ramp", (Leg(3.0, amplitude, omega),), 1.0)
+    shaken = Segment(2.0, 2.9 * amplitude, 12.0)
+    violent = Start("violent", (shaken, replace(shaken, duration=3.0), Segment(2.0, amplitude, omega)), 0.1)
+    return violent, Start("ramp", (Segment(3.0, amplitude, omega),), 1.0)
 
 
 @pytest.fixture(scope="module", autouse=True)

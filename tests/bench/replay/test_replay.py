@@ -15,7 +15,7 @@ from bench.analysis.signals import ACCELERATION
 from bench.app.cli.main import main
 from bench.config.model import BenchConfiguration
 from bench.config.sections import Acquisition, Simulation
-from bench.control.oscillator import DriveCalibration, Leg
+from bench.control.oscillator import DriveCalibration, Segment
 from bench.datafile.reader import open_datafile
 from bench.engine.interface import Requests
 from bench.engine.steps import Arm, Calibrate, Dwell, Measured, OperatorAction, Plan, Publish, RampOut, Sweep
@@ -64,7 +64,7 @@ class Two:
             yield OperatorAction(OperatorTask.REMOVE_BLOCK, BARE, work)
             yield Arm(0.5)
             yield Calibrate(DriveCalibration.flat(1.0))
-            yield Sweep((Leg(1.0, amplitude, OMEGA),))
+            yield Sweep((Segment(1.0, amplitude, OMEGA),))
             outcome = yield Dwell(4)
             assert isinstance(outcome, Measured)
             peak = float(np.mean([cycle.peak[ACCELERATION] for cycle in outcome.cycles]))
@@ -258,7 +258,7 @@ def test_what_is_not_as_recorded_is_told(
     replayed = played(path)
     assert not replayed.agrees
     assert [each.part for each in replayed.found.differences] == [part]
-    assert said in str(replayed.parted(part))
+    assert said in str(replayed.first_difference(part))
 
 
 def _reworded(path: Path) -> None:
@@ -376,8 +376,8 @@ def test_another_measurement_leads_to_another_drive_and_that_is_where_it_parts(t
         # the amplitude of the second test follows from the first one's measurement
         counts[1600:begin] = (counts[1600:begin] * 0.9).astype(np.int16)
     replayed = played(path)
-    assert "run 2" in str(replayed.parted(DRIVE))
-    assert replayed.parted(POINTS) is not None
+    assert "run 2" in str(replayed.first_difference(DRIVE))
+    assert replayed.first_difference(POINTS) is not None
 
 
 def test_the_pace_is_kept_and_nothing_is_ever_late() -> None:

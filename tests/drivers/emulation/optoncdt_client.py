@@ -109,7 +109,7 @@ class Bare:
 
     def say(self, command: str) -> str:
         """The answer, prompt included."""
-        return self.dialogue.hear(command.encode() + b"\r\n", self.now).decode()
+        return self.dialogue.receive(command.encode() + b"\r\n", self.now).decode()
 
     def stream(self, seconds: float, size: int = 1, turn: float = 0.002) -> NDArray[np.int64]:
         """Blocks sent while so much time passes, shape (n, size)."""

@@ -48,7 +48,7 @@ def test_both_outputs_of_laser_2_see_the_tilted_block_and_its_release(bench: Emu
     enabled = hour.now
     hour.now += 8.0
     times = enabled + np.linspace(-8.0, 7.9, 4000)
-    serial = rotation(bench.seen(2, times), 0.3, bench.specimen.block)
+    serial = rotation(bench.target_displacement(2, times), 0.3, bench.specimen.block)
     before, after = serial[times < enabled + 3.0], serial[times > enabled + 5.5]
     np.testing.assert_allclose(before, -0.07, atol=1e-15)
     assert after.max() > 0.03
@@ -69,20 +69,20 @@ def test_a_hand_holds_on_while_the_amplifier_does_not_listen(bench: EmulatedBenc
         bench.enable(True)
         bench.enable(False)
         hour.now += 20.0
-        assert bench.seen(2, np.array([hour.now - 0.01]))[0] == pytest.approx(0.01, abs=1e-5)
+        assert bench.target_displacement(2, np.array([hour.now - 0.01]))[0] == pytest.approx(0.01, abs=1e-5)
     bench.enable(True)
     hour.now += 5.1
     bench.inputs(bench.tick() - 1, 1)
     hour.now += 3.0
-    assert bench.seen(2, hour.now - np.linspace(3.0, 0.0, 500)).min() < -0.008
+    assert bench.target_displacement(2, hour.now - np.linspace(3.0, 0.0, 500)).min() < -0.008
 
 
 def test_a_block_that_was_taken_away_is_no_target(bench: EmulatedBench, hour: Hour) -> None:
     bench.perform(OperatorTask.WATCH_BLOCK, 0.3)
     bench.perform(OperatorTask.REMOVE_BLOCK, None)
     hour.now += 1.0
-    assert np.isnan(bench.seen(2, np.array([hour.now - 0.1]))).all()
-    assert np.isfinite(bench.seen(1, np.array([hour.now - 0.1]))).all()
+    assert np.isnan(bench.target_displacement(2, np.array([hour.now - 0.1]))).all()
+    assert np.isfinite(bench.target_displacement(1, np.array([hour.now - 0.1]))).all()
 
 
 def test_hands_stay_off_while_the_amplifier_listens(bench: EmulatedBench) -> None:

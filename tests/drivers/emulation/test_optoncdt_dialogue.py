@@ -42,9 +42,9 @@ def test_with_echo_the_command_comes_back() -> None:
 def test_a_command_may_come_in_pieces_and_with_others(end: str) -> None:
     bare = Bare()
     command = f"MEASRATE{end}OUTPUT{end}OUTHOLD"
-    pieces = [bare.dialogue.hear(character.encode(), bare.now) for character in command]
+    pieces = [bare.dialogue.receive(character.encode(), bare.now) for character in command]
     assert b"".join(pieces) == b"MEASRATE 4\r\n->OUTPUT RS422\r\n->"
-    assert bare.dialogue.hear(end.encode(), bare.now) == b"OUTHOLD NONE\r\n->"
+    assert bare.dialogue.receive(end.encode(), bare.now) == b"OUTHOLD NONE\r\n->"
 
 
 @pytest.mark.parametrize(
@@ -112,7 +112,7 @@ def test_a_setting_is_answered_as_the_command_that_makes_it(setting: str) -> Non
 def test_what_is_wrong_is_refused_and_changes_nothing(command: str, number: int) -> None:
     bare = Bare()
     before = bare.sensor.settings
-    answer = bare.dialogue.hear(command.encode("latin-1") + b"\n", bare.now).decode()
+    answer = bare.dialogue.receive(command.encode("latin-1") + b"\n", bare.now).decode()
     assert answer.startswith(f"E{number} ")
     assert answer.endswith("\r\n->")
     assert bare.sensor.settings == before
@@ -121,7 +121,7 @@ def test_what_is_wrong_is_refused_and_changes_nothing(command: str, number: int)
 def test_a_command_without_end_is_forgotten_but_for_its_length() -> None:
     bare = Bare()
     for _ in range(100):
-        assert bare.dialogue.hear(b"X" * 1000, bare.now) == b""
+        assert bare.dialogue.receive(b"X" * 1000, bare.now) == b""
     assert bare.say("").startswith("E214 ")
     assert bare.say("OUTPUT") == "OUTPUT RS422\r\n->"
 
@@ -182,11 +182,11 @@ def test_mastering_waits_two_seconds_for_a_distance() -> None:
     bare.now += 1.9
     assert bare.say("MEASRATE") == ""
     bare.now += 0.2
-    assert bare.dialogue.hear(b"", bare.now) == b"E104 Timeout\r\n->MEASRATE 4\r\n->"
+    assert bare.dialogue.receive(b"", bare.now) == b"E104 Timeout\r\n->MEASRATE 4\r\n->"
     assert bare.say("MASTERMV") == "MASTERMV NONE\r\n->"
     assert bare.say("MASTERMV MASTER 1") == ""
     bare.sensor.target = None
-    assert bare.dialogue.hear(b"", bare.now) == b"->"
+    assert bare.dialogue.receive(b"", bare.now) == b"->"
     assert bare.say("MASTERMV") == "MASTERMV MASTER 1.000000\r\n->"
 
 

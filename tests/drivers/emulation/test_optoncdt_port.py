@@ -179,7 +179,7 @@ def test_what_was_heard_at_a_wrong_baud_rate_spoils_the_next_command(make: Make,
     sensor = make()
     port = connect(sensor, 115200)
     port.write(b"GETUSERLEVEL")
-    wait(lambda: sensor._dialogue._heard != b"")  # pyright: ignore[reportPrivateUsage]
+    wait(lambda: sensor._dialogue._received != b"")  # pyright: ignore[reportPrivateUsage]
     port.baudrate = 921600
     assert say(port, "").startswith("E210 ")
     assert say(port, "GETUSERLEVEL") == "GETUSERLEVEL PROFESSIONAL\r\n"

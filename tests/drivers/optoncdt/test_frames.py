@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from drivers.errors import ConnectionLost, RigError
 from drivers.optoncdt.codec import Decoder
-from drivers.optoncdt.frames import Assembler, Frames, Layout, layout_in, wanted
+from drivers.optoncdt.frames import Assembler, Frames, Layout, additional_signals, layout_in
 from sim.errors import InvalidInput
 from tests.drivers.optoncdt.script import measurements
 
@@ -146,12 +146,12 @@ def test_counts_that_begin_anew_are_a_lost_connection(layout: Layout) -> None:
     ],
 )
 def test_as_much_is_asked_for_as_the_line_carries(rate: float, baud: int, signals: tuple[str, ...]) -> None:
-    assert wanted(rate, baud) == signals
+    assert additional_signals(rate, baud) == signals
 
 
 def test_a_rate_that_the_line_does_not_carry_is_refused() -> None:
     with pytest.raises(InvalidInput, match=r"115200 baud allow at most 1920 measurements/s .* higher baud rate"):
-        wanted(4000, 115_200)
+        additional_signals(4000, 115_200)
 
 
 @pytest.mark.parametrize(

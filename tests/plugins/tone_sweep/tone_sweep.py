@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import PositiveFloat
 
 from bench.analysis.signals import ACCELERATION, SIGNALS
-from bench.control.oscillator import DriveCalibration, Leg, program
+from bench.control.oscillator import DriveCalibration, Segment, program
 from bench.datafile.tables import Column, Table
 from bench.document.campaign import Campaign
 from bench.document.document import Picture, Section
@@ -57,11 +57,13 @@ class ToneSweep(Prepared[SweepParameters]):
         if (table := response_of(self.configuration)) is None:
             return Forecast(duration=length)
         steps = [(float(gain) * p.volts, omega) for gain, omega in zip(self.gains, p.omega, strict=True)]
-        legs = tuple(leg for level, omega in steps for leg in (Leg(1.0, level, omega), Leg(1.0, 0.0, omega)))
+        segments = tuple(
+            segment for level, omega in steps for segment in (Segment(1.0, level, omega), Segment(1.0, 0.0, omega))
+        )
         mass, shaker, time = bare.mass, self.configuration.shaker_model, self.configuration.limits.heating_time
-        demands = load(program(legs), 0.0, length, payload=mass, shaker=shaker, response=table, heating_time=time)
+        demands = load(program(segments), 0.0, length, payload=mass, shaker=shaker, response=table, heating_time=time)
         found = [Demand(key, demands[key], None, "the sweep") for key in bounds(self.configuration) if key in demands]
-        return Forecast(tuple(found), (Stage("the sweep", legs),), length)
+        return Forecast(tuple(found), (Stage("the sweep", segments),), length)
 
     @cached_property
     def prediction(self) -> Table:
@@ -75,7 +77,7 @@ class ToneSweep(Prepared[SweepParameters]):
         yield Calibrate(DriveCalibration.flat(1.0))  # amplitudes are volts
         for omega, predicted in zip(p.omega, self.gains, strict=True):
             yield Publish(StepStarted(f"sweep at {omega:g} rad/s"))
-            yield Sweep((Leg(1.0, p.volts, omega),))
+            yield Sweep((Segment(1.0, p.volts, omega),))
             outcome = yield Dwell(p.cycles + 2)
             cycles = outcome.cycles[2:] if isinstance(outcome, Measured) else ()
             if len(cycles) >= 4:
@@ -84,7 +86,7 @@ class ToneSweep(Prepared[SweepParameters]):
                 yield Publish(LiveValue("gain of the table", gain, "m/s2/V", doubt, float(predicted)))
                 points.append(SweepPoint(omega_rad_s=omega, gain_m_s2_v=gain, gain_uncertainty=doubt))
                 yield Publish(PointFinished(points[-1]))
-            yield Sweep((Leg(1.0, 0.0, omega),))
+            yield Sweep((Segment(1.0, 0.0, omega),))
         yield RampOut()
         return self.result(points)
 

@@ -81,7 +81,7 @@ class Script:
             case Arm():
                 self.cycles = 0
                 self.testing = False
-            case Sweep(legs=legs) if self.mounted and len(legs) > 1:
+            case Sweep(segments=segments) if self.mounted and len(segments) > 1:
                 self.testing = True
                 self.start += 1
             case Dwell(cycles=n) if self.testing:

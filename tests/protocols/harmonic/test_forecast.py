@@ -14,7 +14,7 @@ from bench.analysis.signals import DRIFT, SignalMap
 from bench.app.cli.main import main
 from bench.app.preflight import Preflight, compile_run
 from bench.config.model import BenchConfiguration
-from bench.control.oscillator import Leg, program
+from bench.control.oscillator import Segment, program
 from bench.engine.steps import Dwell, Sweep
 from bench.guard.conversion import Extremes
 from bench.guard.limits import Violation
@@ -54,7 +54,7 @@ def test_the_bare_frame_moves_as_its_linear_response_says() -> None:
     """At 20 rad/s, above both modes, the ramp is soft: the peaks are those of the steady state."""
     omega = 20.0
     bare = next(trial for trial in _trials(HarmonicParameters(omega=(omega,), beta=(BETA,))) if trial.steady)
-    (moved,) = stage_travels([bare.specimen], [program(bare.legs)], bare.begin, "ground", 0.35)
+    (moved,) = stage_travels([bare.specimen], [program(bare.segments)], bare.begin, "ground", 0.35)
     u1, u2 = steady_response(Specimen(), omega, AMPLITUDE)
     table = -AMPLITUDE / omega**2
     seen = (abs(u1 + table), abs(u2 + table), abs(u2 - u1))
@@ -65,8 +65,11 @@ def test_the_bare_frame_moves_as_its_linear_response_says() -> None:
 def test_specimens_simulated_together_move_as_each_alone(reference: Literal["ground", "table"]) -> None:
     """They share the times and the phase of the table, bit for bit."""
     coupled = Specimen().coupled(BETA)
-    legs = (Leg(2.0, 0.9 * AMPLITUDE, 25.0), Leg(3.0, 1.3 * AMPLITUDE, 12.0), Leg(1.0, AMPLITUDE, 12.0))
-    programs = [program([replace(leg, amplitude=k * leg.amplitude) for leg in legs]) for k in (1.0, 0.97, 1.03, 3.0)]
+    segments = (Segment(2.0, 0.9 * AMPLITUDE, 25.0), Segment(3.0, 1.3 * AMPLITUDE, 12.0), Segment(1.0, AMPLITUDE, 12.0))
+    programs = [
+        program([replace(segment, amplitude=k * segment.amplitude) for segment in segments])
+        for k in (1.0, 0.97, 1.03, 3.0)
+    ]
     together = stage_travels([coupled] * 4, programs, 0.5, reference, 0.35)
     alone = [stage_travels([coupled], [each], 0.5, reference, 0.35)[0] for each in programs]
     assert together == alone
@@ -91,17 +94,19 @@ def test_the_lab_sheet_drives_what_was_predicted() -> None:
     assert found.rocking is not None
     script = Script(lambda *_: None, found.bare.drift)
     script.run()
-    followed = [leg for step in script.steps if isinstance(step, Sweep) for leg in step.legs]
+    followed = [segment for step in script.steps if isinstance(step, Sweep) for segment in step.segments]
     forecast = _trials(PARAMETERS)
     starts = [trial.stage for trial in forecast if trial.beta is not None]
     assert len(starts) == PARAMETERS.starts
-    assert [leg for stage in starts for leg in stage.legs] == followed[-sum(len(stage.legs) for stage in starts) :]
+    assert [segment for stage in starts for segment in stage.segments] == followed[
+        -sum(len(stage.segments) for stage in starts) :
+    ]
     (spring,) = [trial.stage for trial in forecast if "beta" in trial.stage.name and trial.beta is None]
-    first = followed.index(spring.legs[0], 3)
-    driven = followed[first : first + len(spring.legs) // 2 + 1]
+    first = followed.index(spring.segments[0], 3)
+    driven = followed[first : first + len(spring.segments) // 2 + 1]
     # each frequency is gone to, then held: the plan asks for the latter as a dwell
-    assert [(leg.amplitude, leg.omega) for leg in driven] == [
-        (leg.amplitude, leg.omega) for leg in (*spring.legs[:-1:2], spring.legs[-1])
+    assert [(segment.amplitude, segment.omega) for segment in driven] == [
+        (segment.amplitude, segment.omega) for segment in (*spring.segments[:-1:2], spring.segments[-1])
     ]
     assert all(step.cycles == 6 for step in script.steps if isinstance(step, Dwell) and step.cycles < 12)
 

@@ -89,7 +89,7 @@ def test_a_table_that_does_not_answer_is_an_error_before_the_drive_is_raised(pea
     script._answer = lambda step: Measured((silent,) * step.cycles) if isinstance(step, Dwell) else Done()
     with pytest.raises(Unmeasurable, match="does not respond to the drive"):
         script.run()
-    followed = [leg.amplitude for step in script.steps if isinstance(step, Sweep) for leg in step.legs]
+    followed = [segment.amplitude for step in script.steps if isinstance(step, Sweep) for segment in step.segments]
     assert followed == [PROBE]
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from bench.control import starts
-from bench.control.oscillator import Leg, program
+from bench.control.oscillator import Segment, program
 from bench.control.starts import CATCH_ANGLE, RATING, TOPS, Start, candidates, plan_starts
 from bench.engine.steps import Publish
 from bench.events import StepStarted
@@ -26,11 +26,11 @@ AMPLITUDE = 1.01 * 9.81 / 8.0
 
 def _tested(specimen: Specimen, start: Start, drive: float = 1.0, dwell: float = 150.0) -> Motion:
     """What the start leads to; the last 10 s of the dwell are watched."""
-    legs = [Leg(leg.duration, drive * leg.amplitude, leg.omega) for leg in start.legs]
-    held = Sweep.dwell(dwell, drive * start.legs[-1].amplitude, start.legs[-1].omega)
+    segments = [Segment(segment.duration, drive * segment.amplitude, segment.omega) for segment in start.segments]
+    held = Sweep.dwell(dwell, drive * start.segments[-1].amplitude, start.segments[-1].omega)
     return simulate(
         specimen,
-        SineProgram([*program(legs).sweeps, held]),
+        SineProgram([*program(segments).sweeps, held]),
         peaks_from=start.duration + dwell - 10.0,
         overturning_angle=CATCH_ANGLE,
     )
@@ -53,8 +53,8 @@ def test_the_first_start_leads_to_the_orbit(omega: float, beta: float) -> None:
     assert start.chance > 0.9
     chances = [start.chance, *(other.chance for other in others)]
     assert chances == sorted(chances, reverse=True)
-    assert start.legs[-1].amplitude == AMPLITUDE
-    assert start.legs[-1].omega == omega
+    assert start.segments[-1].amplitude == AMPLITUDE
+    assert start.segments[-1].omega == omega
     motion = _tested(specimen, start)
     assert motion.peaks.drift == pytest.approx(orbit.peaks.drift, rel=0.02)
     assert motion.peaks.theta == pytest.approx(orbit.peaks.theta, rel=0.02)
@@ -68,7 +68,7 @@ def test_where_two_branches_exist_the_block_is_lifted_off_its_rest() -> None:
     assert found.resting is not None
     start = plan_starts(specimen, 20.0, AMPLITUDE, found.rocking.orbit, 1)[0]
     assert start.chance > 0.9
-    assert max(leg.amplitude for leg in start.legs) > AMPLITUDE
+    assert max(segment.amplitude for segment in start.segments) > AMPLITUDE
 
 
 def test_where_the_orbit_is_unstable_a_start_only_has_to_keep_the_block_standing() -> None:
@@ -123,7 +123,7 @@ def _in_full(specimen: Specimen, omega: float, orbit: Orbit, count: int) -> tupl
     won, simulated = starts._successes(left, cases(RATING)), simulated + RATING * len(left)
     chances = (won + 1.0) / (RATING + 2.0)
     order = starts._best_first(left, won)
-    return [Start(left[i].name, left[i].legs, float(chances[i])) for i in order], simulated
+    return [Start(left[i].name, left[i].segments, float(chances[i])) for i in order], simulated
 
 
 @pytest.fixture
@@ -178,12 +178,14 @@ def test_a_specimen_that_is_known_worse_has_smaller_chances() -> None:
 @pytest.mark.parametrize("omega", [12.5, 25.0, 30.0])
 def test_every_candidate_is_another_and_ends_as_asked(omega: float) -> None:
     found = candidates(omega, AMPLITUDE)
-    assert len({candidate.legs for candidate in found}) == len({candidate.name for candidate in found}) == len(found)
+    assert (
+        len({candidate.segments for candidate in found}) == len({candidate.name for candidate in found}) == len(found)
+    )
     for candidate in found:
-        assert (candidate.legs[-1].amplitude, candidate.legs[-1].omega) == (AMPLITUDE, omega)
-        assert candidate.duration == pytest.approx(sum(leg.duration for leg in candidate.legs))
-        assert all(leg.omega == omega or leg.omega in TOPS for leg in candidate.legs)
-    assert min(len(candidate.legs) for candidate in found) == 1
+        assert (candidate.segments[-1].amplitude, candidate.segments[-1].omega) == (AMPLITUDE, omega)
+        assert candidate.duration == pytest.approx(sum(segment.duration for segment in candidate.segments))
+        assert all(segment.omega == omega or segment.omega in TOPS for segment in candidate.segments)
+    assert min(len(candidate.segments) for candidate in found) == 1
 
 
 def _chances_said(script: Script) -> list[str]:

@@ -189,7 +189,7 @@ def test_the_level_keeps_every_limit_at_a_distance(limits: Limits, binds: str, t
     configuration = bench(limits=limits, ramps=Ramps(abort=0.5, stop=4.0))
     found = planned(SHORT, configuration)
     assert (found.binds, found.level < SHORT.level) == (binds, True)
-    assert found.asked[binds] == pytest.approx(SHARE * getattr(limits, binds))
+    assert found.demands[binds] == pytest.approx(SHARE * getattr(limits, binds))
     margins = compile_run("identify", PROTOCOL.prepare(SHORT, configuration, None), tmp_path).margins
     assert margins[0].bound.quantity == binds
     assert margins[0].margin == pytest.approx(1.0 - SHARE)

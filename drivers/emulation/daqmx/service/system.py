@@ -112,32 +112,32 @@ class SystemService(Service):
     ) -> pb.GetDeviceAttributeStringResponse:
         if (attribute := attribute_of(request)) in _CHASSIS:
             return pb.GetDeviceAttributeStringResponse(value=self._chassis(request, attribute))
-        return pb.GetDeviceAttributeStringResponse(value=self._asked(_TEXTS, request))
+        return pb.GetDeviceAttributeStringResponse(value=self._device_attribute(_TEXTS, request))
 
     def GetDeviceAttributeBool(
         self, request: pb.GetDeviceAttributeBoolRequest, context: object
     ) -> pb.GetDeviceAttributeBoolResponse:
-        return pb.GetDeviceAttributeBoolResponse(value=self._asked(_FLAGS, request))
+        return pb.GetDeviceAttributeBoolResponse(value=self._device_attribute(_FLAGS, request))
 
     def GetDeviceAttributeUInt32(
         self, request: pb.GetDeviceAttributeUInt32Request, context: object
     ) -> pb.GetDeviceAttributeUInt32Response:
-        return pb.GetDeviceAttributeUInt32Response(value=self._asked(_NUMBERS, request))
+        return pb.GetDeviceAttributeUInt32Response(value=self._device_attribute(_NUMBERS, request))
 
     def GetDeviceAttributeInt32(
         self, request: pb.GetDeviceAttributeInt32Request, context: object
     ) -> pb.GetDeviceAttributeInt32Response:
-        return pb.GetDeviceAttributeInt32Response(value_raw=self._asked(_CODES, request))
+        return pb.GetDeviceAttributeInt32Response(value_raw=self._device_attribute(_CODES, request))
 
     def GetDeviceAttributeDouble(
         self, request: pb.GetDeviceAttributeDoubleRequest, context: object
     ) -> pb.GetDeviceAttributeDoubleResponse:
-        return pb.GetDeviceAttributeDoubleResponse(value=self._asked(_RATES, request))
+        return pb.GetDeviceAttributeDoubleResponse(value=self._device_attribute(_RATES, request))
 
     def GetDeviceAttributeDoubleArray(
         self, request: pb.GetDeviceAttributeDoubleArrayRequest, context: object
     ) -> pb.GetDeviceAttributeDoubleArrayResponse:
-        return pb.GetDeviceAttributeDoubleArrayResponse(value=self._asked(_RANGES, request))
+        return pb.GetDeviceAttributeDoubleArrayResponse(value=self._device_attribute(_RANGES, request))
 
     def GetPhysicalChanAttributeInt32(
         self, request: pb.GetPhysicalChanAttributeInt32Request, context: object
@@ -164,7 +164,7 @@ class SystemService(Service):
             raise unsupported(attribute)
         return device.chassis
 
-    def _asked(self, table: Mapping[int, Callable[[DeviceModel], T]], request: _AboutDevice) -> T:
+    def _device_attribute(self, table: Mapping[int, Callable[[DeviceModel], T]], request: _AboutDevice) -> T:
         device = self._driver.catalogue.device(request.device_name)
         if (attribute := attribute_of(request)) not in table:
             raise unsupported(attribute)

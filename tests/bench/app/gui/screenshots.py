@@ -90,7 +90,7 @@ def take(folder: Path) -> None:
 
         controller.event_received.connect(measuring)
         asked: list[Question] = []
-        controller.asked.connect(lambda question, asked=asked: asked.append(question) if question else None)
+        controller.question_changed.connect(lambda question, asked=asked: asked.append(question) if question else None)
         window.pages.setCurrentWidget(window.protocol)
         window.protocol.realtime.setChecked(False)
         window.protocol.person.setChecked(True)

@@ -14,7 +14,7 @@ from bench.app.ipc.broadcast import Reduction
 from bench.app.ipc.messages import TRACES, Opened
 from bench.config.model import BenchConfiguration
 from bench.config.toml import read_configuration
-from bench.control.oscillator import DriveCalibration, Leg
+from bench.control.oscillator import DriveCalibration, Segment
 from bench.datafile.reader import open_datafile
 from bench.engine.interface import Ending
 from bench.engine.steps import Arm, Calibrate, Dwell, OperatorAction, Plan, RampOut, Sweep
@@ -63,7 +63,7 @@ def _run(path: Path, configuration: BenchConfiguration) -> tuple[Ending, list[Ev
         yield OperatorAction(OperatorTask.REMOVE_BLOCK, bare, "take the block off")
         yield Arm(0.5)
         yield Calibrate(DriveCalibration.flat(1.0))
-        yield Sweep((Leg(4.0, 1.5, OMEGA),))
+        yield Sweep((Segment(4.0, 1.5, OMEGA),))
         yield Dwell(12)
         yield RampOut()
 

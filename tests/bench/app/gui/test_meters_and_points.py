@@ -137,7 +137,7 @@ def test_the_verdict_is_48_px_high_where_it_fits(qtbot: QtBot) -> None:
     qtbot.addWidget(label)
     label.resize(618, 100)
     label.allow(575)
-    label.say("α₂ 0.1879 ± 0.0014 · predicted 0.188 ± 0.062 · ✓ agrees · ω 16 rad/s, β 0.4")
+    label.show_sentence("α₂ 0.1879 ± 0.0014 · predicted 0.188 ± 0.062 · ✓ agrees · ω 16 rad/s, β 0.4")
     assert label.pixels == LARGEST == 48
     label.allow(200)
     assert label.pixels < LARGEST

@@ -323,7 +323,7 @@ def test_a_protocol_without_a_gain_shows_its_fits_instead_of_an_empty_gain_plot(
     assert curve.getData()[1].max() == pytest.approx(1.0), "in mm"
     assert "(1234.5 ± 3.0) N/m" in run.verdict.sentence
     assert "±" in run.point.text()
-    window._controller._over(Ended("completed", "", {}, "", Path("never")), Notice(0.0, "end", ""))
+    window._controller._finish_run(Ended("completed", "", {}, "", Path("never")), Notice(0.0, "end", ""))
     window._controller.start(replace(order(Path("never")), protocol="harmonic", parameters=HarmonicParameters()))
     assert run.shown_plot.currentWidget() is run.gains
     assert run.live.drawn == []

@@ -10,7 +10,7 @@ from bench.app.ipc.client import SessionClient
 from bench.app.ipc.messages import Run
 from bench.config.model import BenchConfiguration
 from bench.config.sections import Acquisition, Simulation
-from bench.control.oscillator import Leg
+from bench.control.oscillator import Segment
 from bench.datafile.tables import Column, Table
 from bench.engine.steps import Arm, Calibrate, Dwell, OperatorAction, Publish, RampOut, Sweep
 from bench.events import PointFinished, StepStarted
@@ -52,7 +52,7 @@ class Shaking(Prepared[ShakingParameters]):
         yield Publish(StepStarted("shaking", time=0.0))
         yield Arm(0.2, patience=5.0)
         yield Calibrate(CALIBRATION)
-        yield Sweep((Leg(0.25, self.parameters.amplitude, OMEGA),))
+        yield Sweep((Segment(0.25, self.parameters.amplitude, OMEGA),))
         for cycle in range(self.parameters.cycles):
             yield Dwell(1)
             for _ in range(self.parameters.gossip):

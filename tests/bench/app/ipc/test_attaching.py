@@ -94,5 +94,5 @@ def test_a_frozen_client_answers_no_question(tmp_path: Path, monkeypatch: pytest
     until(lambda: not server.attended)
     until(lambda: here.send(Alive()) or server.attended)
     here.close()
-    until(lambda: not server.outbox.heard)
+    until(lambda: not server.broadcast.has_clients)
     assert not server.attended

@@ -99,7 +99,7 @@ def test_inputs_that_cannot_be_read_end_what_is_driven_with_their_own_reason(
 @pytest.mark.usefixtures("teller")
 def test_they_are_told_while_a_question_stands_from_the_thread_of_the_engine(host: SessionServer, rig: Wired) -> None:
     sent: list[object] = []
-    host.outbox.put = lambda message, **_how: sent.append(message)  # type: ignore[method-assign]
+    host.broadcast.put = lambda message, **_how: sent.append(message)  # type: ignore[method-assign]
     answers: list[bool] = []
     asking = RemoteOperator(host, Requests())
     engine = threading.Thread(target=lambda: answers.append(asking.confirm("Clamp the table.")), name="engine")

@@ -222,10 +222,10 @@ def test_a_halt_is_heard_from_a_client_that_reads_nothing() -> None:
     here, there = Pipe()
     requests = Requests()
     host = SessionServer(there, requests, print)
-    unread = host.outbox.join()
+    unread = host.broadcast.join()
     start = time.monotonic()
     for number in range(50_000):
-        host.outbox.put(Published(StepStarted("x" * 100, time=float(number))))
+        host.broadcast.put(Published(StepStarted("x" * 100, time=float(number))))
     assert time.monotonic() - start < 5.0
     assert unread.lost_events > 0
     here.send(Ask("halt"))
