@@ -256,13 +256,13 @@ class CheckedRig:
 
 
 _NONE: tuple[()] = ()
-"""What most rigs return as raw values in every block; compared by identity, since a backend may return any type."""
+"""Result of `raw_values` for most rigs, in every block; compared by identity, since a backend may return any type."""
 
 
 class _Calls:
     """Context manager that converts exceptions that a rig must not raise into BackendFault.
 
-    A class, because a generator would take several times as long, and every block needs it six times.
+    Implemented as a class: a generator would take several times as long, and every block uses it six times.
     """
 
     __slots__ = ("_backend", "_call")

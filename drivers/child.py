@@ -1,7 +1,7 @@
-"""Child processes that serve a run, and must outlive requests to end that are sent to the whole process group.
+"""Child processes that serve a run and must survive termination requests sent to the whole process group.
 
-While the output is driven, the program answers such a request by a ramp to zero. If a child ended first, the program
-would have lost an instrument and would cut the output at once. These children end when their standard input is closed.
+While the output is driven, the program responds to such a request by ramping it to zero. If a child ended first, the
+program would lose an instrument and cut the output at once. These children end when their standard input is closed.
 """
 
 import signal

@@ -20,7 +20,7 @@ from sim.table_orbit import TICKS, TablePeriod, table_orbit
 Array = NDArray[np.float64]
 
 OBSERVED = 3
-"""Number of harmonics of u1 and of the drift in y."""
+"""Number of harmonics, of u1 and of the drift each, that the vector y contains."""
 
 STEP = 1e-4
 """Step of the finite differences: for states relative to their scales, for the control as a share."""

@@ -89,8 +89,8 @@ def simulate_many(
 
 
 def side_by_side(runs: list[RockingRun]) -> list[Motion]:
-    """Results of several runs, computed together, bit-identical to those of `RockingRun.motion`. The runs have no
-    samples, and equal order, tolerance and overturning angle.
+    """Results of several runs, computed together and bit-identical to those of `RockingRun.motion`. The runs must have
+    no sample times, and must agree in order, tolerance and overturning angle.
     """
     from sim.kernel import members as kernel
 

@@ -63,7 +63,11 @@ class SpecimenKnowledge(SpecimenUncertainty):
 
     identified: Identified = Identified()
     give: float = quantity(
-        0.0, "1", "relative half width of the block's restitution, because the table moves at the impacts", ge=0, lt=1
+        0.0,
+        "1",
+        "additional relative half width of the block's restitution, to allow for motion of the table at impacts",
+        ge=0,
+        lt=1,
     )
 
     def draws(self, specimen: Specimen, n: int, random: np.random.Generator) -> list[Specimen]:

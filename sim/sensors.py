@@ -142,14 +142,14 @@ class Accelerometer(LinearSensor):
     """Servo or MEMS accelerometer on the table, usable down to zero frequency."""
 
     sensitivity: float = quantity(1.0, "V s2/m", "volts per m/s2 as calibrated", gt=0)
-    noise_density: float = quantity(2e-4, "m/s2/Hz^0.5", "spectral density of the white noise", ge=0)
+    noise_density: float = quantity(2e-4, "m/s2/Hz^0.5", "amplitude spectral density of the white noise", ge=0)
 
 
 class DisplacementSensor(LinearSensor):
     """Displacement transducer between table and ground."""
 
     sensitivity: float = quantity(100.0, "V/m", "volts per metre as calibrated", gt=0)
-    noise_density: float = quantity(5e-7, "m/Hz^0.5", "spectral density of the white noise", ge=0)
+    noise_density: float = quantity(5e-7, "m/Hz^0.5", "amplitude spectral density of the white noise", ge=0)
 
 
 Place = Literal["table", "storey 1", "storey 2", "elsewhere"]
@@ -166,7 +166,7 @@ class PlacedSensor(LinearSensor):
     place: Place = quantity(..., "", "part on which the sensor is mounted")
     sensitivity: float = quantity(..., "V/unit", "volts per unit as calibrated")
     zero: float = quantity(0.0, "V", "output voltage when the measured quantity is zero")
-    noise_density: float = quantity(0.0, "unit/Hz^0.5", "spectral density of the white noise", ge=0)
+    noise_density: float = quantity(0.0, "unit/Hz^0.5", "amplitude spectral density of the white noise", ge=0)
 
     @property
     def nominal(self) -> tuple[float, float]:

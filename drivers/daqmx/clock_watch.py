@@ -21,7 +21,7 @@ _READING = struct.Struct("<dqd")
 _PACE = 0.01
 """Pause between two readings [s]."""
 _GOLDEN = 0.6180339887498949
-"""Phase step between two readings, whose multiples are evenly distributed over a period."""
+"""Phase step between consecutive readings [periods]; its multiples are evenly distributed over a period."""
 _IDLE = 0.02
 _MOST = 10_000
 

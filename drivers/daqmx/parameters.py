@@ -65,7 +65,7 @@ class Heartbeat(Parameters):
     """Line that toggles once per block, for a relay in the enable chain that opens when toggling stops."""
 
     line: str = quantity("Dev1/port0/line5", "", "digital output line")
-    timeout: float = quantity(1.0, "s", "time after the last rising edge at which its relay opens", ge=0.1, le=10)
+    timeout: float = quantity(1.0, "s", "time from the last rising edge to the opening of the relay", ge=0.1, le=10)
 
 
 class Tls(Parameters):
@@ -106,9 +106,13 @@ class Daq(Parameters):
         "host:port of the gRPC device server on the controller; if absent, the NI-DAQmx driver of this PC is used",
         example="crio.local:31763",
     )
-    tls: Tls | None = quantity(None, "", "encryption of the connection to that server; absent: plain")
+    tls: Tls | None = quantity(
+        None, "", "encryption of the connection to that server; if absent, the connection is plain"
+    )
     plain_connection: bool = quantity(
-        False, "", "whether a plain connection may leave this computer and private networks, which is refused otherwise"
+        False,
+        "",
+        "whether an unencrypted connection to a server outside this computer and private networks is permitted",
     )
     output: str = quantity("Dev1/ao0", "", "physical channel of the drive output")
     output_range: float = quantity(10.0, "V", "largest magnitude of the drive output", gt=0, le=10, usual=(1.0, 10.0))
@@ -145,7 +149,7 @@ class Daq(Parameters):
     amplifier_ready: AmplifierReady | None = quantity(None, "", "amplifier ready; absent if not wired")
     heartbeat: Heartbeat | None = quantity(None, "", "heartbeat; absent if there is no heartbeat relay")
     buffer: float = quantity(
-        10.0, "s", "duration of the data that the input buffer holds: longest possible delay of a read", ge=1.0, le=60.0
+        10.0, "s", "capacity of the input buffer as a duration: the longest possible delay of a read", ge=1.0, le=60.0
     )
     timeout_margin: float = quantity(
         2.0, "s", "time allowed for a call to the driver beyond its own duration", ge=0.1, le=60, formerly="patience"

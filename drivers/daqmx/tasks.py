@@ -245,7 +245,7 @@ def description_of(
         else f"{daq.watchdog:g} s",
         "heartbeat": "none"
         if heartbeat is None
-        else f"{heartbeat.line}; its relay opens after {heartbeat.timeout:g} s",
+        else f"{heartbeat.line}; its relay opens {heartbeat.timeout:g} s after the last rising edge",
         **{name: f"{given.line}, {given.good} is good" for name, given in daq.safety_inputs.items()},
         **dict.fromkeys(daq.missing_inputs, _MISSING),
         "tasks left by another client": ", ".join(stale) or "none",

@@ -127,7 +127,9 @@ class EmulatedBench:
             self._subscriber = subscriber
 
     def connect_laser(self, storey: int, live: Callable[[], bool]) -> None:
-        """Switch the analogue output of the laser on storey 1 or 2: it supplies the error current unless `live()`."""
+        """Switch the analogue output of the laser on storey 1 or 2; while `live()` is false, it
+        supplies the error current.
+        """
         with self.lock:
             self._outputs[1 + storey] = live
 

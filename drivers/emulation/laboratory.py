@@ -117,12 +117,12 @@ class Laboratory:
         self.bench.perform(OperatorTask(arguments["work"]), arguments.get("amount"))
 
     def _laser(self, arguments: Mapping[str, Any]) -> None:
-        """Inject a fault of the laser on `storey`, named by a method of EmulatedLaser, with its `arguments`."""
+        """Inject a fault of the laser on `storey` by a method of EmulatedLaser, given by name, with its `arguments`."""
         laser = self.lasers[int(arguments["storey"]) - 1]
         _FAULTS_OF_LASER[arguments["fault"]](laser, *arguments.get("arguments", ()))
 
     def _daq(self, arguments: Mapping[str, Any]) -> None:
-        """Inject a fault of the DAQ, named by a method of DaqServer, with its `arguments`."""
+        """Inject a fault of the DAQ by a method of DaqServer, given by name, with its `arguments`."""
         _FAULTS_OF_DAQ[arguments["fault"]](self.daq, *arguments.get("arguments", ()))
 
     def _safety(self, arguments: Mapping[str, Any]) -> None:

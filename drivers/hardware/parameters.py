@@ -82,7 +82,7 @@ class Lasers(Parameters):
     observation_time: float = quantity(
         10.0,
         "s",
-        "time for which the lasers are observed before the first run, to identify their clocks",
+        "time for which the lasers are observed before the first run, to determine the rates of their clocks",
         ge=1,
         le=120,
         formerly="listening",

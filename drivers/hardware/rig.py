@@ -27,7 +27,7 @@ _FIRST_READINGS = 20
 """Number of readings of the sample clock after its start, which bound it to within a fraction of a call's duration."""
 
 _GOLDEN = 0.6180339887498949
-"""Phase step between two readings, whose multiples are evenly distributed over a period."""
+"""Phase step between consecutive readings [periods]; its multiples are evenly distributed over a period."""
 _READINGS = 6
 """Number of readings of the sample clock after each block; the tightest of several is much tighter than a single
 one.

@@ -51,7 +51,7 @@ class Readings(Protocol):
 
     @property
     def arrival(self) -> NDArray[np.float64]:
-        """Arrival time [s of the machine's clock]."""
+        """Arrival time of each value on the machine's clock [s]."""
         ...
 
 

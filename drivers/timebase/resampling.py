@@ -84,9 +84,10 @@ decrease of that number per plausible value.
 
 class Plausibility:
     """Marks single values that differ from the last plausible one by more than `largest_step` per measurement since
-    then, as when a flipped bit gives another valid distance. Counts beyond +-`largest` are not values.
+    then, as when a flipped bit gives another valid distance. Counts beyond +-`largest` are fault marks and are left
+    unchanged.
 
-    Only rare values are marked: frequent or lasting jumps are a motion, which the guard must judge.
+    Only rare jumps are marked: frequent or lasting ones are treated as motion, which the guard must judge.
     """
 
     def __init__(self, largest: int, largest_step: float, mark: int) -> None:

@@ -23,8 +23,8 @@ Amplitudes = NDArray[np.complex128]
 class Sines:
     """Complex amplitudes c at `omega` [rad/s], shape (n,) each, with signal = Re(c exp(-i omega t)).
 
-    The four sensors measure a common motion. Amplitudes are displacements [m]; the accelerometer's are computed as
-    acceleration / -omega^2. `drive` is in volts, `acceleration` in m/s2.
+    The four sensors measure a common motion. `drive` is in volts and `acceleration` in m/s2; all
+    other amplitudes are displacements [m]. `accelerometer` is the displacement computed as acceleration / -omega^2.
     """
 
     omega: NDArray[np.float64]

@@ -47,8 +47,8 @@ _MOTION = (("r_motion", "r_exp"), ("r_motion_uncertainty", "r_exp_uncertainty"))
 
 @dataclass(frozen=True, eq=False)
 class Impacts:
-    """Impacts after one tilt [rad]: `speed` relative to the speed in a fall from the critical angle, r, and its
-    expanded uncertainty from noise, shape (n,) each.
+    """Impacts after one `tilt` [rad], arrays of shape (n,): `speed`, relative to the speed in a fall from the critical
+    angle; `restitution` r; and `uncertainty`, the expanded uncertainty of r due to noise.
     """
 
     tilt: float

@@ -72,14 +72,17 @@ class Watchdog:
         return self._expired
 
     def expire_to(self, states: dict[str, bool]) -> None:
-        """Set the levels of lines on expiry."""
+        """Set the levels that lines take on expiry."""
         self._states.update(states)
 
     def engage(self, is_free: Callable[[str], bool]) -> None:
         pass
 
     def hold_at(self, volts: dict[str, float]) -> None:
-        """Set the voltages of analogue outputs on expiry. Raises DaqmxFailure on a device that sets lines only."""
+        """Set the voltages that analogue outputs take on expiry.
+
+        Raises DaqmxFailure on a device that sets lines only.
+        """
         if len(self._parts) == 1:
             raise DaqmxFailure(
                 DAQmxErrors.ATTRIBUTE_NOT_SUPPORTED_IN_TASK_CONTEXT,
