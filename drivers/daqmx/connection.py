@@ -79,8 +79,8 @@ class Connection:
     """Connection to the driver of this PC or of a server; it provides the options with which tasks are created there.
 
     Encrypted if `tls` is given. `plain` permits an unencrypted connection to a server outside private networks.
-    Raises DeviceNotFound if no server answers within 2 s, InvalidInput for an address without port, for a plain connection to a public network, and for
-    certificates that cannot be read.
+    Raises DeviceNotFound if no server answers within 2 s, InvalidInput for an address without port, for a plain
+    connection to a public network, and for certificates that cannot be read.
     """
 
     def __init__(self, server: str | None, patience: float, tls: Tls | None = None, *, plain: bool = False) -> None:
