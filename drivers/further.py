@@ -44,7 +44,7 @@ class FurtherChannel(CalibratedInput):
     warning: float = quantity(0.9, "1", "fraction of the limit above which the operator is warned", gt=0, le=1)
     debounce: float = quantity(0.003, "s", "time for which the limit must be exceeded before it trips", ge=0, le=1)
     noise_density: float = quantity(
-        0.0, "unit/Hz^0.5", "spectral density of the white noise of the simulated sensor", ge=0, example=2e-4
+        0.0, "unit/Hz^0.5", "amplitude spectral density of the simulated sensor's white noise", ge=0, example=2e-4
     )
 
     @model_validator(mode="after")

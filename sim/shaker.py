@@ -43,7 +43,7 @@ class Shaker(Parameters):
     stop_damping: float = quantity(
         2.0, "s/m", "Hunt-Crossley damping of an end stop: relative increase of its force per m/s of approach", ge=0
     )
-    force_noise: float = quantity(0.005, "N/Hz^0.5", "spectral density of the white force noise on the table", ge=0)
+    force_noise: float = quantity(0.005, "N/Hz^0.5", "amplitude spectral density of the white force noise", ge=0)
     band_low: float = quantity(1.0, "Hz", "lower end of the usable band", gt=0)
     band_high: float = quantity(100.0, "Hz", "upper end of the usable band", gt=0)
 

@@ -19,8 +19,8 @@ from drivers.daqmx.library import InputChannel
 
 @dataclass(frozen=True)
 class InputDelay:
-    """Delay of an input: its sample i is the signal at `seconds` before edge i of the sample clock, after it if
-    negative.
+    """Delay of an input: its sample i is the signal at `seconds` before edge i of the sample clock. A negative delay
+    means a time after the edge.
 
     `uncertainty` is the standard uncertainty [s], infinite if the delay is unknown; `source` names the source of the
     value.

@@ -80,7 +80,7 @@ class Tls(Parameters):
     client_certificate: str | None = quantity(
         None,
         "",
-        "PEM file of the client certificate (mutual TLS, a server with root_cert), relative to this file; absent: none",
+        "PEM file of the client's certificate, relative to this file, for a server that requires one; absent: none",
         example="client_self_signed_crt.pem",
     )
     client_key: str | None = quantity(

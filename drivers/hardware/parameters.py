@@ -68,7 +68,10 @@ class Lasers(Parameters):
         "connection of both lasers: a sensor cannot use its serial line and its analogue output at the same time",
     )
     reference: Literal["ground", "table"] = quantity(
-        "ground", "", "part on which the lasers are mounted: on the ground they measure x + u, on the table u"
+        "ground",
+        "",
+        "where the lasers are mounted: on the ground they measure a storey's absolute displacement, on the table its "
+        "displacement relative to the table",
     )
     rate: float = quantity(4000.0, "1/s", "measuring rate of each laser", gt=0, le=8000)
     delay: float = quantity(
