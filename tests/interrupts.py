@@ -180,8 +180,10 @@ class Bed:
                     asked = time.monotonic()
                     os.killpg(process.pid, signal.SIGINT)
                     if second is not None:
-                        time.sleep(second)
-                        if process.poll() is None:
+                        # a process that ends meanwhile needs no second one, and is not waited for longer
+                        try:
+                            process.wait(second)
+                        except subprocess.TimeoutExpired:
                             os.killpg(process.pid, signal.SIGINT)
                     process.wait(60.0)
                     end = time.monotonic() - asked
