@@ -149,8 +149,11 @@ def path_of(counter: str) -> str:
     return _PATHS.get(counter, counter)
 
 
+_GROUPS = ("checksums", "data", "fitted", "instrument", "metadata", "notes", "recovery", "user")
+RESERVED = (*_GROUPS, "points", "samples")
+"""Names below /entry that no table of a protocol's events may have; `samples` is a counter in `complete`."""
 FIXED_GROUPS = (
-    *("checksums", "data", "fitted", "instrument", "metadata", "notes", "recovery", "user"),
+    *_GROUPS,
     *(path for path in map(path_of, counters(())) if "/" not in path and path != "samples"),
 )
 FIXED_ENTRIES = ("complete", "end_time", "program_name", "start_time", "status", "summary", "title")

@@ -12,7 +12,15 @@ import numpy as np
 
 from bench.datafile import hdf5, tables
 from bench.datafile.checksums import Checksums
-from bench.datafile.declared import FIXED_ENTRIES, FIXED_GROUPS, FIXED_INSTRUMENTS, TABLES, counters, event_tables
+from bench.datafile.declared import (
+    FIXED_ENTRIES,
+    FIXED_GROUPS,
+    FIXED_INSTRUMENTS,
+    RESERVED,
+    TABLES,
+    counters,
+    event_tables,
+)
 from bench.datafile.fields import Field, fields_of
 from bench.datafile.opening import FORMAT, FORMAT_VERSION, INTERVALS, WORDING
 from bench.datafile.rows import Growing, Rows, rows_of
@@ -65,9 +73,10 @@ class Skeleton:
         if not self.sample_rate > 0.0:
             raise InvalidInput("sample_rate", self.sample_rate, "it must be a positive number of samples per second")
         names = [channel.name for channel in self.channels]
+        paths = [table.path for table in event_tables(self.events).values()]
         _check_names("channel", names, (*FIXED_INSTRUMENTS, *(each for name in names for each in companions(name))))
         _check_names("metadata entry", list(self.metadata), ())
-        _check_names("table of events", list(self.own), (*TABLES, "points", "data", *FIXED_ENTRIES))
+        _check_names("table of events", paths, (*TABLES, *RESERVED, *FIXED_ENTRIES))
         _check_names("table", list(self.tables), (*FIXED_GROUPS, *FIXED_ENTRIES, *self.own))
         for name, table in self.tables.items():
             _check_names(f"column of table {name}", list(table), ())

@@ -10,6 +10,7 @@ import shutil
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
+from uuid import uuid4
 from zipfile import BadZipFile
 
 import numpy as np
@@ -22,7 +23,9 @@ from sim.errors import InvalidInput
 from sim.map_rows import Continuation
 
 STATE, OWN = "state.npz", "unfinished-map"
-"""Names of the state file, and of an empty file that marks the folder as one that may be removed."""
+"""Names of the state file, and of the file that marks the folder as one that may be removed and names the process that
+writes to it.
+"""
 
 TEXT = "<U16"
 """Type of columns that contain strings."""
@@ -39,12 +42,17 @@ class MapStore:
         self._key = sha256(json.dumps([inputs, stamp()], sort_keys=True).encode()).hexdigest()
         self._columns: dict[str, dict[str, str]] = {}
         self._rows = 0
+        self._process, self._claimed = uuid4().hex, False
         self.after: Continuation | None = None
         """State from which the map continues; None at its beginning."""
         self._load()
 
     def append(self, table: Table, after: Continuation) -> None:
-        """Append the rows of a block, and save the state `after` it. Raises OSError."""
+        """Append the rows of a block, and save the state `after` it.
+
+        Raises OSError, and InvalidInput if the folder is not one of an unfinished map, or another process has begun to
+        write to it.
+        """
         if not self._columns:
             if self.folder.exists() and not (self.folder / OWN).exists():
                 raise InvalidInput(
@@ -52,7 +60,7 @@ class MapStore:
                 )
             self.remove()
             self.folder.mkdir()
-            (self.folder / OWN).touch()
+            self._claim()
             self._columns = {
                 name: {
                     "type": TEXT if each.values.dtype.kind == "U" else each.values.dtype.str,
@@ -61,6 +69,9 @@ class MapStore:
                 }
                 for name, each in table.items()
             }
+        if not self._claimed:
+            self._claim()
+        self._require_claim()
         count = 0
         for name, each in table.items():
             kind = np.dtype(self._columns[name]["type"])
@@ -71,6 +82,7 @@ class MapStore:
                 file.truncate()
                 file.flush()
                 os.fsync(file.fileno())
+        self._require_claim()
         self._rows += count
         self.after = after
         about = json.dumps([self._key, self._rows, after.rows, self._columns])
@@ -82,7 +94,9 @@ class MapStore:
         replace(temporary, self.folder / STATE)
 
     def table(self) -> Table:
-        """All rows; their values are read from the files when they are used."""
+        """All rows; their values are read from the files when they are used. Raises InvalidInput like `append`."""
+        if self._claimed:
+            self._require_claim()
         return {
             name: Column(self._values(name, each["type"]), each["unit"], each["description"])
             for name, each in self._columns.items()
@@ -91,6 +105,20 @@ class MapStore:
     def remove(self) -> None:
         """Remove the folder of a map whose results have been written."""
         shutil.rmtree(self.folder, ignore_errors=True)
+
+    def _claim(self) -> None:
+        (self.folder / OWN).write_text(self._process, encoding="ascii")
+        self._claimed = True
+
+    def _require_claim(self) -> None:
+        """Refuse to continue if another process writes to the folder: the rows of the two would be mixed."""
+        try:
+            owner = (self.folder / OWN).read_text(encoding="ascii")
+        except OSError:
+            owner = ""
+        if owner != self._process:
+            remedy = "another process writes its map there; wait for its end, or choose another name for the results"
+            raise InvalidInput("folder", str(self.folder), remedy)
 
     def _values(self, name: str, kind: str) -> NDArray[Any]:
         if not self._rows:

@@ -214,7 +214,7 @@ def _compare_rows(
                 continue
             if not same_intervals and any(part in name for part in OF_INTERVALS):
                 continue
-            apart = _relative_difference(was[name], now[name], scales.get(name, 0.0))
+            apart = _relative_difference(was[name], now[name], scales.get((name, was.get("unit")), 0.0))
             if apart > rounding:
                 text = f"row {number} of {what}: {name} was {was[name]!r} and is {_plain(now[name])!r}"
                 found.differences.append(Difference(text, what))
@@ -236,13 +236,14 @@ def _is_wording(was: Any, now: Any) -> bool:
     return any(" " in text and text[0] not in "{[" for text in (was, now))
 
 
-def _scales(rows: Sequence[Mapping[str, Any]]) -> dict[str, float]:
-    """Largest finite magnitude of each field with numbers."""
-    scales: dict[str, float] = {}
+def _scales(rows: Sequence[Mapping[str, Any]]) -> dict[tuple[str, Any], float]:
+    """Largest finite magnitude of each field with numbers, separately for each unit where rows state one."""
+    scales: dict[tuple[str, Any], float] = {}
     for row in rows:
         for name, value in row.items():
             if isinstance(value, int | float) and isfinite(value):
-                scales[name] = max(scales.get(name, 0.0), abs(value))
+                key = name, row.get("unit")
+                scales[key] = max(scales.get(key, 0.0), abs(value))
     return scales
 
 

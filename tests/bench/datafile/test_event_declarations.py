@@ -173,3 +173,33 @@ def test_the_stream_stamps_what_has_no_time(own: bool) -> None:
     clock.wait_until(12.5)
     stream.publish(StepStarted("go", time=1.0) if own else StepStarted("go"))
     assert [event.time for event in published] == [1.0 if own else 2.5]
+
+
+@pytest.mark.parametrize("name", ["samples", "points", "metadata", "instrument", "checksums", "fitted", "events"])
+def test_a_table_with_a_name_of_the_file_is_refused(tmp_path: Path, name: str) -> None:
+    @event(table=name)
+    class Own(Event):
+        """Event of a plug-in."""
+
+        value: float = column("1", "a value")
+
+    with pytest.raises(InvalidInput, match="already used in the file"):
+        begin(tmp_path / "campaign.h5", events=(Own,))
+    assert not (tmp_path / "campaign.h5").exists()
+
+
+def test_two_tables_of_one_name_are_refused(tmp_path: Path) -> None:
+    @event(table="own")
+    class First(Event):
+        """Event of a plug-in."""
+
+        value: float = column("1", "a value")
+
+    @event(table="own")
+    class Second(Event):
+        """Event of a plug-in."""
+
+        other: float = column("1", "another value")
+
+    with pytest.raises(InvalidInput, match="already used in the file"):
+        begin(tmp_path / "campaign.h5", events=(First, Second))

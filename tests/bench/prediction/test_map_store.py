@@ -97,3 +97,17 @@ def test_a_folder_of_others_is_not_removed(tmp_path: Path) -> None:
     with pytest.raises(InvalidInput, match="does not contain an unfinished map"):
         MapStore(tmp_path / "map", {}).append(table(1.0), state(1))
     assert (tmp_path / "map" / "thesis.txt").exists()
+
+
+@pytest.mark.parametrize("inputs", [{"omega": 1}, {"omega": 2}])
+def test_two_processes_do_not_mix_their_rows(tmp_path: Path, inputs: object) -> None:
+    folder = tmp_path / "map"
+    first = MapStore(folder, {"omega": 1})
+    first.append(table(1.0, 2.0), state(1))
+    second = MapStore(folder, inputs)
+    second.append(table(8.0, 9.0), state(1))
+    with pytest.raises(InvalidInput, match="another process writes its map there"):
+        first.append(table(3.0), state(2))
+    with pytest.raises(InvalidInput, match="another process writes its map there"):
+        first.table()
+    assert second.table()["alpha_2"].values.tolist()[-2:] == [8.0, 9.0]
