@@ -113,7 +113,7 @@ def _follow_strip(strip: _Strip) -> tuple[Floats, Floats, NDArray[np.complex128]
     and Jacobians of the last rows.
     """
     known, own = len(strip.sections), len(strip.peaks)
-    # peaks of rows before the block are not needed
+    # peaks of rows before this block of rows are not needed
     peaks: Floats = np.full((known, *strip.sections.shape[1:2], 3), np.nan)
     peaks[known - own :] = strip.peaks
     rows = [

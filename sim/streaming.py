@@ -30,9 +30,9 @@ class Stream:
 
     The acceleration consists of values at intervals of `dt` [s], interpolated linearly, where the very first value is
     only the start of the first interval. With `held`, each value is instead held for the following `dt`, as at the
-    output of a converter. In each interval, `divisions` states are evaluated, at the ends of equal parts. The intervals
-    may be far longer than those of the required states, because the motion within them is a polynomial. With 0, no
-    states are evaluated. `peaks_from` [s] is the start of the window of the running peaks, or None for no peaks. The
+    output of a converter. In each interval, `divisions` states are evaluated, at the ends of equal parts; with
+    `divisions` = 0, none. `dt` may be far longer than the spacing of the states, because the motion within an interval
+    is a polynomial. `peaks_from` [s] is the start of the window of the running peaks, or None for no peaks. The
     other arguments are those of `sim.rocking.simulate`, and the motion is bit-identical to its motion under a
     `SampledRecord`.
 

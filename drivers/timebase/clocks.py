@@ -50,7 +50,7 @@ class SampleClock:
 
     @property
     def rate(self) -> float:
-        """Seconds of the sample clock per second of the machine's."""
+        """Seconds of the sample clock per second of the machine's clock."""
         self._refresh()
         return 1.0 / (1.0 + self._slope)
 

@@ -16,7 +16,9 @@ _KEPT = 120.0
 
 @dataclass(frozen=True)
 class Points:
-    """Readings at ascending `seconds` of one clock, with their `delay` on another, shape (n,) each [s]."""
+    """Readings at ascending `seconds` of one clock, shape (n,); `delay` is another clock's reading minus this one's, up
+    to sign, shape (n,) [s].
+    """
 
     seconds: NDArray[np.float64]
     delay: NDArray[np.float64]

@@ -41,7 +41,7 @@ TOLERANCE = 1e-7
 
 
 def travel(specimen: Specimen, shaking: Shaking, factor: float, grounded: bool) -> Travel:
-    """Simulate the specimen from rest under `factor` times the record, until it ends or the block falls."""
+    """Simulate the specimen from rest under `factor` times the record, until the record ends or the block falls."""
     record = shaking.prepared.record
     times = np.arange(0.0, record.duration, STEP)
     motion = simulate(

@@ -186,7 +186,7 @@ def _remarked(point: HarmonicPoint, remark: str) -> HarmonicPoint:
 
 
 def _table_multiplier(branch: Branch, shaker: Shaker, harmonics: int) -> float | None:
-    """Modulus of the slowest multiplier on the table; None if no orbit is found."""
+    """Greatest modulus of the multipliers on the table; None if no orbit is found."""
     try:
         return abs(table_orbit(branch.orbit, shaker, harmonics).slowest)
     except NoOrbit:

@@ -19,7 +19,7 @@ RATE = 200.0
 """Highest sample rate after the reduction [1/s]: far above the modes and their harmonics."""
 
 MOST_LOST = 0.02
-"""Largest fraction of missing samples of a sensor."""
+"""Largest permitted fraction of missing samples of a sensor."""
 
 
 class Unusable(RockbenchError):

@@ -85,7 +85,7 @@ def without_gaps(seen: Recording) -> Recording:
 
 
 def find_swings(seen: Recording, least: float) -> Swings:
-    """The half swings down to the first one whose largest angle is below `least` [rad].
+    """The half swings before the first one whose largest angle is below `least` [rad].
 
     Raises NotRocking, with a remedy, if the block was not released or did not come to rest.
     """

@@ -149,7 +149,7 @@ class Watch:
         threading.Thread(target=self._watch, name="interrupts", daemon=True).start()
 
     def claim(self) -> bool:
-        """Whether the interrupt has not been reported yet; if so, the caller must report it."""
+        """Claim the report of the interrupt: True for the first caller, which must report it, False for later ones."""
         return self._unanswered.acquire(blocking=False)
 
     def _watch(self) -> None:

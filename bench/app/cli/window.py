@@ -74,7 +74,8 @@ def gui(
 ) -> int:
     """Open the operator's window.
 
-    Runs are separate processes, which ramp the output to zero when the window closes. STOP in the window is a request
+    Runs are separate processes. When the window closes, they ramp the output to zero, unless they were set to continue
+    without it. STOP in the window is a request
     to the software; the emergency stop is the red button at the bench.
     """
     require("gui", "rockbench gui")

@@ -37,7 +37,7 @@ class Reader(QObject):
         self._done.connect(self._tell)
 
     def call(self, function: Callable[[], object]) -> None:
-        """Schedule a call of `function`; calls that are still pending are dropped."""
+        """Schedule a call of `function`; earlier calls that have not started are dropped."""
         self._latest += 1
         number = self._latest
         self._pool.clear()

@@ -203,8 +203,8 @@ class _Holder(QWidget):
 
 
 def give_key(button: QAbstractButton, key: str) -> None:
-    """Press the button with `key` while it is visible and enabled. A held key counts once, whereas the button's own
-    shortcut would repeat.
+    """Let `key` press the button while the button is visible and enabled. A held key counts once, whereas the button's
+    own shortcut would repeat.
     """
     shortcut = QShortcut(QKeySequence(key), button, autoRepeat=False)
     shortcut.activated.connect(button.click)

@@ -196,7 +196,7 @@ def queued(protocol: "Protocol[Any]", parameters: Parameters, out: Path | None, 
 
 
 def ready(test: Queued, number: int, configuration: "BenchConfiguration") -> Ready:
-    """Check parameters and folder of a test against the bench. Raises InvalidInput that names the test."""
+    """Check the parameters of a test against the bench, and its folder. Raises InvalidInput that names the test."""
     try:
         protocol = load_protocol(test.protocol)
         parameters = validated(protocol.parameters, test.parameters, dotted)

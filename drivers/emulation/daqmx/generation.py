@@ -103,7 +103,7 @@ class Instant:
 
 
 class OutputTerminal:
-    """Analogue output that holds a value or plays a signal; both change at a tick."""
+    """Analogue output that holds a value or plays a signal; every change takes effect at a tick."""
 
     def __init__(self, instant: Instant) -> None:
         self._instant = instant

@@ -45,7 +45,8 @@ def mastered_codes(shares: NDArray[np.float64]) -> NDArray[np.int64]:
 
 
 def words(blocks: NDArray[np.int64]) -> NDArray[np.uint8]:
-    """Bytes of `n` blocks of `m` values of 18 bits, shape (n, m): low, middle and high six bits (manual, p. 84).
+    """Bytes, in the order sent, of `blocks`, shape (n, m): n blocks of m values of 18 bits, each as its low, middle and
+    high six bits (manual, p. 84).
 
     The two upper bits of each byte identify the byte of the value and mark the first value of a block.
     """
