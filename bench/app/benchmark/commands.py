@@ -108,7 +108,10 @@ def _measured(arguments: Sequence[str], folder: Path) -> dict[str, Cell]:
 
 
 def _ended(process: "subprocess.Popen[bytes]") -> tuple[int, float | None, float | None]:
-    """Exit code, processor time [s] and greatest memory [MB] of a process at its end."""
+    """Exit code, processor time [s] and greatest memory [MB] of a process at its end.
+
+    On Linux the greatest memory is at least that of the process that started it.
+    """
     if sys.platform == "win32":
         end(process, float("inf"))
         return process.returncode, None, None
