@@ -60,7 +60,6 @@ class MapStore:
                 )
             self.remove()
             self.folder.mkdir()
-            self._claim()
             self._columns = {
                 name: {
                     "type": TEXT if each.values.dtype.kind == "U" else each.values.dtype.str,
