@@ -37,7 +37,9 @@ def load(path: Path) -> RecordText:
     except FileNotFoundError:
         raise InvalidInput("record", str(path), "there is no such file") from None
     except OSError as error:
-        raise InvalidInput("record", str(path), f"the file cannot be read: {error.strerror}") from None
+        raise InvalidInput(
+            "record", str(path), f"the file cannot be read ({error.strerror}); check its path and permissions"
+        ) from None
     except ValueError as error:
         raise InvalidInput("record", str(path), str(error)) from None
     if b"\0" in content:

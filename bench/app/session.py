@@ -116,7 +116,7 @@ def run_session(
             hold_up=PATIENCE if virtual else 0.0,
             chunk_time=VIRTUAL_CHUNK_TIME if virtual else CHUNK_TIME,
         )
-        stream = EventStream(rig.clock, [recorder, *subscribers])
+        stream = EventStream(rig.clock, [recorder, *subscribers], recorder.stores)
         status, reason = "failed", "the program failed"
         try:
             opened(rig, stream.publish)

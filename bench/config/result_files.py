@@ -46,7 +46,9 @@ class KeptFile:
         except FileNotFoundError:
             raise InvalidInput(self.item, str(path), "there is no such file") from None
         except OSError as error:
-            raise InvalidInput(self.item, str(path), f"the file cannot be read: {error.strerror}") from None
+            raise InvalidInput(
+                self.item, str(path), f"the file cannot be read ({error.strerror}); check its path and permissions"
+            ) from None
         except (ValueError, RecursionError) as error:
             raise InvalidInput(self.item, str(path), f"it is not valid JSON: {error}") from None
         content = cast(dict[str, Any], data) if isinstance(data, dict) else {}

@@ -35,7 +35,9 @@ def read_table(path: Path, item: str) -> dict[str, Any]:
     except FileNotFoundError:
         raise InvalidInput(item, str(path), "there is no such file") from None
     except OSError as error:
-        raise InvalidInput(item, str(path), f"the file cannot be read: {error.strerror}") from None
+        raise InvalidInput(
+            item, str(path), f"the file cannot be read ({error.strerror}); check its path and permissions"
+        ) from None
     except UnicodeDecodeError as error:
         raise InvalidInput(item, str(path), f"the file is not UTF-8 text (byte {error.start})") from None
     except RecursionError:

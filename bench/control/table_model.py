@@ -127,7 +127,9 @@ class TableModel(Parameters):
         except FileNotFoundError:
             raise InvalidInput("table model", str(path), "there is no such file") from None
         except OSError as error:
-            raise InvalidInput("table model", str(path), f"the file cannot be read: {error.strerror}") from None
+            raise InvalidInput(
+                "table model", str(path), f"the file cannot be read ({error.strerror}); check its path and permissions"
+            ) from None
         except (ValueError, RecursionError) as error:
             raise InvalidInput("table model", str(path), f"the file is not valid JSON: {error}") from None
         return validated(TableModel, data)

@@ -2,13 +2,14 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bench.datafile import hdf5
 from bench.datafile.declared import TABLES, part_of
-from bench.datafile.fields import Kind
+from bench.datafile.fields import Kind, fields_from
 from bench.datafile.hdf5 import Dataset, Group
 from bench.datafile.hdf5_reading import UNREADABLE, DataFileError, reason
 from bench.datafile.opening import intact_rows, is_within
@@ -124,19 +125,23 @@ def renew_drive(entry: hdf5.Group) -> None:
         hdf5.append(made, np.full(min(_ROWS_AT_ONCE, rows - start), np.nan, dtype=np.float32))
 
 
-def renew_tables(entry: hdf5.Group, lost: Iterable[str], own: Iterable[str]) -> None:
-    """Empty every table that has a dataset among the `lost` paths; its rows may be recovered from the journal. Tables
-    of the protocol's `own` events are removed instead, because their columns are declared only by the protocol.
+def renew_tables(
+    entry: hdf5.Group, lost: Iterable[str], own: Iterable[str], lines: Iterable[Mapping[str, Any]]
+) -> None:
+    """Empty every table that has a dataset among the `lost` paths; its rows may be recovered from the `lines` of the
+    journal. The columns of the tables of the protocol's `own` events are in these lines; without them the table is
+    removed.
     """
     gone = tuple(lost)
+    declared = {line["table"]: line["fields"] for line in lines if "table" in line and "fields" in line}
     for path in (*TABLES, *own):
         if any(each == f"/entry/{path}" or each.startswith(f"/entry/{path}/") for each in gone):
             folder, _, name = path.rpartition("/")
             parent = hdf5.group(entry, folder) if folder else entry
             if name in parent:
                 hdf5.delete(parent, name)
-            if path in TABLES:
-                rows_of(parent, name, TABLES[path])
+            if fields := TABLES.get(path) or fields_from(declared.get(path)):
+                rows_of(parent, name, fields)
 
 
 def cut(entry: hdf5.Group, counted: Mapping[str, int]) -> dict[str, int]:

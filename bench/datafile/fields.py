@@ -112,6 +112,22 @@ def field_of(name: str, stored: hdf5.Dataset) -> Field:
         return Field(name, Kind(attrs["kind"]), unit, told, bool(attrs["optional"]))
 
 
+def fields_from(declared: Any) -> tuple[Field, ...]:
+    """Fields from the journal, where they are stored as JSON; empty if they are not valid."""
+    fields = list[Field]()
+    try:
+        for each in declared:
+            given = dict[str, Any](each)
+            name = given["name"] + ""
+            if not (name.isidentifier() and isinstance(given["unit"] + given["description"], str)):
+                return ()
+            given["kind"] = Kind(given["kind"])
+            fields.append(Field(**given))
+    except (TypeError, ValueError, KeyError, AttributeError):
+        return ()
+    return tuple(fields) if len({each.name for each in fields}) == len(fields) else ()
+
+
 def fields_of(row_type: type[Any]) -> tuple[Field, ...]:
     """The fields of a group of parameters, or the columns of a dataclass (`sim.parameters.column`) other than its
     parts.

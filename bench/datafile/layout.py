@@ -136,7 +136,7 @@ def build(file: hdf5.File, skeleton: Skeleton) -> Parts:
     rows = dict[str, Rows]()
     for path, fields in {**TABLES, **skeleton.own, "points": fields_of(skeleton.point_type)}.items():
         folder, _, name = path.rpartition("/")
-        rows[name] = rows_of(instrument if folder else entry, name, fields)
+        rows[name] = rows_of(instrument if folder else entry, name, fields, samples.packer)
     replaced = create_ends(entry, counters(skeleton.own))
     grown = [*samples.grown, *(each for table in rows.values() for each in table.grown)]
     checksums = Checksums(entry, [*(each.path for each in grown), *(each.name for each in replaced)])

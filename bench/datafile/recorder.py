@@ -76,8 +76,8 @@ class Recorder:
     `chunk_time` is the duration of a chunk of samples [s].
 
     `metadata` is stored as strings under /entry/metadata, `tables` (such as {"prediction": ...}) under /entry. `events`
-    are those of the protocol whose tables the file needs. Raises InvalidInput, without creating a file, if `path`
-    exists or cannot be created, or if a name or table is invalid.
+    are those of the protocol whose tables the file needs; any other event is stored as a line of the journal. Raises
+    InvalidInput, without creating a file, if `path` exists or cannot be created, or if a name or table is invalid.
     """
 
     def __init__(
@@ -129,10 +129,12 @@ class Recorder:
                 f"point of type {type(event.point).__name__} was not recorded: {self.path} is for"
                 f" {self._point_type.__name__}"
             )
-        elif not self._writer.has_table(type(event)):
-            raise DataFileError(f"{type(event).__name__} was not recorded: name it in `events` of its protocol")
         elif not isinstance(event, Progress):
             self._enqueue(event)
+
+    def stores(self, event: type[Event]) -> bool:
+        """Whether the columns of the event are stored, and not only its line in the journal."""
+        return self._writer.has_table(event)
 
     def sync(self) -> None:
         """Wait until all queued events are in the file. Raises DataFileError, once, if they could not be written."""

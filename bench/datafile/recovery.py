@@ -190,13 +190,14 @@ def _rebuild(record: DataFile, path: Path, temporary: Path, target: Path, progre
         drop_channels(entry, copying.lost)
         _require_channels(entry)
         renew_drive(entry)
-        renew_tables(entry, copying.lost, record.own_tables)
+        lines = list(read_journal(journal_path(path)))
+        renew_tables(entry, copying.lost, record.own_tables, lines)
         cut(entry, copying.counted)
         gone = {at: told for at, told in copying.lost.items() if not _is_renewed(at)}
         damage = gone | {at: told for at, told in judged.failing.items() if not _is_renewed(at)}
         events = points = 0
         try:
-            events, points = add_lost_events(entry, list(read_journal(journal_path(path))))
+            events, points = add_lost_events(entry, lines)
         except DataFileError as error:
             damage["journal"] = str(error)
         grown = {each.name: each.shape[0] for each in hdf5.datasets(entry) if hdf5.grows(each)}

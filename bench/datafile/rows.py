@@ -48,10 +48,20 @@ class Packer:
 def pack(chunks: NDArray[Any]) -> list[bytes]:
     """The bytes of `chunks`, shape (n, rows), after the filters `hdf5.FILTERS`: for each chunk the first bytes of all
     values, then the second bytes, and so on, compressed.
+
+    Each result is padded with zeros, which decoders ignore after the end of the stream, to whole pages of the file or
+    to a half, a quarter ... of a page. HDF5 would otherwise keep a description of each unused remainder of a page in
+    memory until the file is closed: 260 bytes per chunk, 9 MB per hour.
     """
     n, size = len(chunks), chunks.dtype.itemsize
     shuffled = np.ascontiguousarray(chunks).view(np.uint8).reshape(n, -1, size).transpose(0, 2, 1)
-    return [zlib.compress(each, hdf5.FILTERS["compression_opts"]) for each in np.ascontiguousarray(shuffled)]
+    packed = [zlib.compress(each, hdf5.FILTERS["compression_opts"]) for each in np.ascontiguousarray(shuffled)]
+    return [each.ljust(_allocated(len(each)), b"\0") for each in packed]
+
+
+def _allocated(size: int) -> int:
+    """Smallest number of whole pages, or power of two below a page, that holds `size` bytes."""
+    return -(-size // hdf5.PAGE) * hdf5.PAGE if size > hdf5.PAGE else 1 << (size - 1).bit_length()
 
 
 class Growing:
@@ -86,9 +96,10 @@ class Growing:
 class Rows:
     """A group with one dataset per field."""
 
-    def __init__(self, parent: hdf5.Group, name: str, fields: Sequence[Field]) -> None:
+    def __init__(self, parent: hdf5.Group, name: str, fields: Sequence[Field], packer: Packer | None = None) -> None:
+        """`packer` compresses the packed fields."""
         group = hdf5.create_group(parent, name, "NXcollection")
-        self._columns = [(field, Growing(field.create(group))) for field in fields]
+        self._columns = [(field, Growing(field.create(group), packer if field.packed else None)) for field in fields]
         self._fields, self._texts = tuple(fields), tuple(field.kind is Kind.TEXT for field in fields)
         self._pending: list[tuple[Any, ...]] = []
         self._written = 0
@@ -135,8 +146,8 @@ class Rows:
 class PackedRows(Rows):
     """Rows of packed numbers, appended as arrays."""
 
-    def __init__(self, parent: hdf5.Group, name: str, fields: Sequence[Field]) -> None:
-        super().__init__(parent, name, fields)
+    def __init__(self, parent: hdf5.Group, name: str, fields: Sequence[Field], packer: Packer | None = None) -> None:
+        super().__init__(parent, name, fields, packer)
         self._arrays: list[tuple[NDArray[Any], ...]] = []
         self._waiting = 0
 
@@ -161,6 +172,6 @@ class PackedRows(Rows):
         self._arrays = [tuple(values[count:] for values in columns)] if self._waiting else []
 
 
-def rows_of(parent: hdf5.Group, name: str, fields: Sequence[Field]) -> Rows:
-    """Create a table of these fields."""
-    return (PackedRows if all(field.packed for field in fields) else Rows)(parent, name, fields)
+def rows_of(parent: hdf5.Group, name: str, fields: Sequence[Field], packer: Packer | None = None) -> Rows:
+    """Create a table of these fields; `packer` compresses the packed ones."""
+    return (PackedRows if all(field.packed for field in fields) else Rows)(parent, name, fields, packer)

@@ -104,8 +104,8 @@ class Samples:
         self.chunk = chunk
         stored = [_create_channel(instrument, channel, self.chunk) for channel in channels]
         stored += [create_drive(instrument, self.chunk), time]
-        self._packer = Packer()
-        self.grown = [Growing(each, self._packer) for each in stored]
+        self.packer = Packer()
+        self.grown = [Growing(each, self.packer) for each in stored]
         self._pending: list[tuple[Counts, NDArray[np.float32], NDArray[np.float64]]] = []
         self._waiting = 0
         self._written = 0
@@ -144,7 +144,7 @@ class Samples:
 
     def close(self) -> None:
         """Release the compression threads."""
-        self._packer.close()
+        self.packer.close()
 
 
 def chunk_of(sample_rate: float, duration: float = CHUNK_TIME) -> int:

@@ -5,6 +5,7 @@ import os
 import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -133,13 +134,17 @@ class DataFileWriter:
             path.unlink(missing_ok=True)
             raise DataFileError(f"{path} could not be created ({reason(error)}): check the disk") from error
         self._counters = counters(skeleton.own)
+        self._own = dict(skeleton.own)
         self._timeline = Timeline(skeleton.sample_rate)
         self._complete: list[int] = []
         self._point_fields = tuple(skeleton.point_type.model_fields)
 
     def has_table(self, event: type[Event]) -> bool:
-        """Whether the event can be stored: the file has its table, or the event has none."""
-        return (table := event_table(event)) is None or table.name in self._parts.rows
+        """Whether the file has the table of the event, or the event has none; False for an invalid declaration."""
+        try:
+            return (table := event_table(event)) is None or table.name in self._parts.rows
+        except InvalidInput:
+            return False
 
     @property
     def full_chunks(self) -> int:
@@ -157,10 +162,14 @@ class DataFileWriter:
         self._parts.rows["raw_values"].extend(*of_all, raw.index, raw.time, raw.code, raw.arrival)
 
     def add_event(self, event: Event) -> None:
-        """Append an event other than a block."""
+        """Append an event other than a block; an event whose table the file lacks is stored in the journal only."""
         rows = self._parts.rows
         more = dict[str, Any]()
-        if (table := event_table(type(event))) is not None:
+        stored = self.has_table(type(event))
+        if stored and (table := event_table(type(event))) is not None:
+            if table.path in self._own:
+                # a recovery can create the table from the journal, without the protocol
+                more |= {"table": table.path, "fields": [asdict(each) for each in self._own.pop(table.path)]}
             for row in table.rows(event):
                 rows[table.name].add(*row)
                 if table.single:
@@ -174,7 +183,7 @@ class DataFileWriter:
             add_fit(rows, event)
         if isinstance(event, SpecimenIdentified):
             add_findings(rows, event.time, event.identified)
-        if not event.journalled:
+        if stored and not event.journalled:
             return
         kind, text = type(event).__name__, event.line
         if isinstance(event, PointFinished):

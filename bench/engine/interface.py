@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from math import isnan
 from typing import Protocol
 
-from bench.events import Event, PointFinished, Subscriber
+from bench.events import Event, PointFinished, Subscriber, Warned
 from drivers.clock import Clock
 from drivers.errors import RigError
 from sim.errors import UNKNOWN, Cause, CauseCode, Interruption, RockbenchError
@@ -162,12 +162,22 @@ class Requests:
 
 
 class EventStream:
-    """Stamps events with the bench time since the start of the session [s] and calls the subscribers in order."""
+    """Stamps events with the bench time since the start of the session [s] and calls the subscribers in order.
 
-    def __init__(self, clock: Clock, subscribers: Sequence[Subscriber]) -> None:
+    `stores` returns whether the data file stores the columns of a type of event; the first event of a type that it does
+    not store causes a warning.
+    """
+
+    def __init__(
+        self,
+        clock: Clock,
+        subscribers: Sequence[Subscriber],
+        stores: Callable[[type[Event]], bool] = lambda _: True,
+    ) -> None:
         self._clock = clock
         self._origin = clock.now()
         self._subscribers = tuple(subscribers)
+        self._stores, self._published = stores, set[type[Event]]()
         self.points: list[Parameters] = []
         """Finished points, in order."""
 
@@ -183,6 +193,11 @@ class EventStream:
         """Pass `event` to every subscriber; stamp it first if it has no time."""
         if isnan(event.time):
             event = replace(event, time=self.now())
+        if (kind := type(event)) not in self._published:
+            self._published.add(kind)
+            if not self._stores(kind):
+                remedy = f"list it in `events` of its protocol, as '{kind.__module__}:{kind.__qualname__}'"
+                self.publish(Warned(f"{kind.__name__} is recorded in the journal only, without its table: {remedy}"))
         for subscriber in self._subscribers:
             subscriber(event)
         if isinstance(event, PointFinished):

@@ -1,5 +1,6 @@
 """Acquisition loop and the steps that run in it."""
 
+from contextlib import suppress
 from math import ceil, tau
 from typing import Never
 
@@ -31,8 +32,8 @@ from bench.events import LimitExceeded, State, Warned
 from bench.guard.guard import Exchange, Guard
 from bench.guard.limits import Violation
 from bench.plugins import plugin_code
-from drivers.rig import Counts, Rig
-from sim.errors import UNKNOWN, Cause, CauseCode, InvalidInput
+from drivers.rig import Alignment, Counts, Rig
+from sim.errors import UNKNOWN, Cause, CauseCode, InvalidInput, RockbenchError
 from sim.specimen import Specimen
 
 
@@ -169,8 +170,12 @@ class AtRest:
         output.machine.go(
             State.STOPPING, "the acquisition at rest is complete" if violation is None else str(violation)
         )
+        alignments: tuple[Alignment, ...] = ()
+        # the end of the run reports such a failure
+        with suppress(RockbenchError):
+            alignments = self._rig.alignments
         output.rest()
-        return RestSamples(self._rig.channels, np.concatenate(counts), violation)
+        return RestSamples(self._rig.channels, np.concatenate(counts), violation, alignments)
 
     def _stillness(self, step: Arm) -> NDArray[np.float64]:
         """Channel values over an interval with the storeys at rest, shape (n, n_channels)."""

@@ -13,7 +13,7 @@ from bench.analysis.cycles import Cycle
 from bench.control.oscillator import DriveCalibration, Segment
 from bench.events import Event
 from bench.guard.limits import Violation
-from drivers.rig import Channel, Counts, OperatorTask
+from drivers.rig import Alignment, Channel, Counts, OperatorTask
 from sim.specimen import Specimen
 
 
@@ -168,12 +168,14 @@ class Measured:
 class RestSamples:
     """Counts of all inputs with the output at zero, shape (n, n_channels).
 
-    `violation` is the exceeded limit that ended the acquisition, if any; the plan continues.
+    `violation` is the exceeded limit that ended the acquisition, if any; the plan continues. `alignments` are those of
+    the sensors with their own clocks, at its end.
     """
 
     channels: tuple[Channel, ...]
     counts: Counts
     violation: Violation | None
+    alignments: tuple[Alignment, ...] = ()
 
 
 Outcome = Done | Fallen | Measured | Played | RestSamples

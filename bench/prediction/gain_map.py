@@ -39,7 +39,9 @@ def map_table(
     betas, omegas = np.sort(request.beta), np.sort(request.omega)
     amplitude = amplitude_of(specimen, request)
     kept = store() if store is not None and betas.size > rows_at_once(omegas.size) else None
-    steps = _Steps(progress, betas.size, rows_at_once(omegas.size), 1 + request.outcomes + (known is not None))
+    steps = _Steps(
+        progress, betas.size, rows_at_once(omegas.size), 1 + request.outcomes + len(IMPACTS) * (known is not None)
+    )
     after = None if kept is None else kept.after
     steps.rows = 0 if after is None else after.rows
     tables = list[Table]()
@@ -96,8 +98,8 @@ def _block(made: GainMap, request: MapRequest, known: SpecimenKnowledge | None, 
         for part, branch in zip(parts, (made.rocking, made.resting), strict=True):
             part |= {"outcome": came.outcome[branch.exists], "outcome_time_s": came.time[branch.exists]}
     if known is not None:
-        done = steps.done(1 + request.outcomes, "computing the uncertainty band")
-        for part, name in zip(parts, IMPACTS, strict=True):
+        for step, (part, name) in enumerate(zip(parts, IMPACTS, strict=True), 1 + request.outcomes):
+            done = steps.done(step, "computing the uncertainty band")
             orbits = _orbits(made, name)
             part |= band_columns(orbits, part["alpha_2"], known, request.members, done, request.scheduler)
     whole = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}

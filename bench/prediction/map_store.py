@@ -4,13 +4,13 @@ Every column is a file to which blocks of rows are appended. A state file, repla
 rows of these files and the state from which the map continues. Longer files are from an interrupted block and are cut.
 """
 
+import gc
 import json
 import os
-import shutil
+from contextlib import suppress
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
-from uuid import uuid4
 from zipfile import BadZipFile
 
 import numpy as np
@@ -21,10 +21,11 @@ from bench.result_cache import stamp
 from bench.unfinished import replace
 from sim.errors import InvalidInput
 from sim.map_rows import Continuation
+from sim.process_lock import LockHeld, ProcessLock
 
 STATE, OWN = "state.npz", "unfinished-map"
-"""Names of the state file, and of the file that marks the folder as one that may be removed and names the process that
-writes to it.
+"""Names of the state file, and of the file that marks the folder as one that may be removed; beside it is the lock of
+the process that writes to the folder.
 """
 
 TEXT = "<U16"
@@ -32,9 +33,10 @@ TEXT = "<U16"
 
 
 class MapStore:
-    """Rows of the map defined by `inputs`, JSON content, in `folder`, which is created with the first block.
+    """Rows of the map defined by `inputs`, JSON content, in `folder`, which this process locks and creates if missing.
 
-    Rows of a map with other inputs, or of another version of the program, are discarded.
+    Rows of a map with other inputs, or of another version of the program, are discarded with the first block. Raises
+    OSError, and InvalidInput if the folder is not one of an unfinished map, or another process writes to it.
     """
 
     def __init__(self, folder: Path, inputs: object) -> None:
@@ -42,24 +44,15 @@ class MapStore:
         self._key = sha256(json.dumps([inputs, stamp()], sort_keys=True).encode()).hexdigest()
         self._columns: dict[str, dict[str, str]] = {}
         self._rows = 0
-        self._process, self._claimed = uuid4().hex, False
         self.after: Continuation | None = None
         """State from which the map continues; None at its beginning."""
+        self._lock = _locked(folder)
         self._load()
 
     def append(self, table: Table, after: Continuation) -> None:
-        """Append the rows of a block, and save the state `after` it.
-
-        Raises OSError, and InvalidInput if the folder is not one of an unfinished map, or another process has begun to
-        write to it.
-        """
+        """Append the rows of a block, and save the state `after` it. Raises OSError."""
         if not self._columns:
-            if self.folder.exists() and not (self.folder / OWN).exists():
-                raise InvalidInput(
-                    "folder", str(self.folder), "it does not contain an unfinished map; rename or remove it"
-                )
-            self.remove()
-            self.folder.mkdir()
+            _clear(self.folder)
             self._columns = {
                 name: {
                     "type": TEXT if each.values.dtype.kind == "U" else each.values.dtype.str,
@@ -68,9 +61,6 @@ class MapStore:
                 }
                 for name, each in table.items()
             }
-        if not self._claimed:
-            self._claim()
-        self._require_claim()
         count = 0
         for name, each in table.items():
             kind = np.dtype(self._columns[name]["type"])
@@ -81,7 +71,6 @@ class MapStore:
                 file.truncate()
                 file.flush()
                 os.fsync(file.fileno())
-        self._require_claim()
         self._rows += count
         self.after = after
         about = json.dumps([self._key, self._rows, after.rows, self._columns])
@@ -93,31 +82,23 @@ class MapStore:
         replace(temporary, self.folder / STATE)
 
     def table(self) -> Table:
-        """All rows; their values are read from the files when they are used. Raises InvalidInput like `append`."""
-        if self._claimed:
-            self._require_claim()
+        """All rows; their values are read from the files when they are used."""
         return {
             name: Column(self._values(name, each["type"]), each["unit"], each["description"])
             for name, each in self._columns.items()
         }
 
+    def close(self) -> None:
+        """Release the folder; it is removed if it contains no rows."""
+        if self.after is None:
+            _remove(self.folder, self._lock)
+        self._lock.release()
+
     def remove(self) -> None:
-        """Remove the folder of a map whose results have been written."""
-        shutil.rmtree(self.folder, ignore_errors=True)
-
-    def _claim(self) -> None:
-        (self.folder / OWN).write_text(self._process, encoding="ascii")
-        self._claimed = True
-
-    def _require_claim(self) -> None:
-        """Refuse to continue if another process writes to the folder: the rows of the two would be mixed."""
-        try:
-            owner = (self.folder / OWN).read_text(encoding="ascii")
-        except OSError:
-            owner = ""
-        if owner != self._process:
-            remedy = "another process writes its map there; wait for its end, or choose another name for the results"
-            raise InvalidInput("folder", str(self.folder), remedy)
+        """Remove the folder of a map whose results have been written. Its table may no longer be referenced."""
+        # Windows does not remove mapped files, which a reference in a cycle, as in a figure, would keep mapped
+        gc.collect()
+        _remove(self.folder, self._lock)
 
     def _values(self, name: str, kind: str) -> NDArray[Any]:
         if not self._rows:
@@ -141,3 +122,40 @@ class MapStore:
             return
         if key == self._key and all(sizes.values()):
             self._rows, self._columns, self.after = rows, columns, after
+
+
+def discard(folder: Path) -> None:
+    """Remove the folder of an unfinished map that will not be continued; another folder, and one to which a process
+    writes, is kept.
+    """
+    if folder.is_dir():
+        with suppress(OSError, InvalidInput):
+            _remove(folder, _locked(folder))
+
+
+def _locked(folder: Path) -> ProcessLock:
+    if folder.exists() and not (folder / OWN).exists() and any(folder.iterdir()):
+        raise InvalidInput("folder", str(folder), "it does not contain an unfinished map; rename or remove it")
+    folder.mkdir(exist_ok=True)
+    (folder / OWN).touch()
+    try:
+        return ProcessLock(folder / OWN, f"process {os.getpid()}")
+    except LockHeld as error:
+        remedy = f"{error.holder} writes its map there; wait for its end, or choose another name for the results"
+        raise InvalidInput("folder", str(folder), remedy) from None
+
+
+def _clear(folder: Path) -> None:
+    """Remove all files but those of the lock."""
+    for path in folder.iterdir():
+        if not path.name.startswith(OWN):
+            path.unlink()
+
+
+def _remove(folder: Path, lock: ProcessLock) -> None:
+    with suppress(OSError):
+        _clear(folder)
+        (folder / OWN).unlink()
+    lock.release(remove=True)
+    with suppress(OSError):
+        folder.rmdir()

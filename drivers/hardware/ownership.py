@@ -1,7 +1,6 @@
 """Locks on devices. Opening a device resets it, which would end the run of another program that uses it.
 
-Each device and serial port has a lock file on this machine. The operating system releases the lock when the process
-ends for any reason. The owner's name is in a second file, because a locked file cannot be read on Windows.
+Each device and serial port has a lock on this machine (`sim.process_lock`).
 """
 
 import getpass
@@ -15,11 +14,10 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from tempfile import gettempdir
 
-from filelock import FileLock, Timeout
-
 from drivers.daqmx.parameters import device_name
 from drivers.errors import DeviceNotFound
 from drivers.hardware.parameters import Hardware
+from sim.process_lock import LockHeld, ProcessLock
 
 FOLDER = "ROCKBENCH_LOCKS"
 """Environment variable that names the folder of the locks; the default folder is shared by all users of this
@@ -39,7 +37,7 @@ def devices_of(hardware: Hardware) -> list[str]:
             # a device must be locked once only, and its name is case-insensitive
             once.setdefault(name.casefold(), f"{name}{where}")
     ports = [given.port for _, given in hardware.serial_lasers if given.port is not None]
-    return [*once.values(), *(os.path.realpath(port) if "/" in port else port for port in ports)]
+    return [*once.values(), *(os.path.realpath(port) if port.startswith("/") else port for port in ports)]
 
 
 def _chassis_and_device(terminal: str) -> list[str]:
@@ -69,25 +67,18 @@ def owned(devices: Iterable[str]) -> Generator[None]:
 @contextmanager
 def _owned(device: str) -> Generator[None]:
     folder = _folder()
-    stem = hashlib.sha256(device.casefold().encode()).hexdigest()[:16]
-    lock = FileLock(folder / f"{stem}.lock", blocking=False, mode=0o666, thread_local=False, fallback_to_soft=False)
-    name = folder / f"{stem}.owner"
     try:
-        lock.acquire()
-    except Timeout:
-        raise DeviceNotFound(f"{device} is in use by {_holder(name)}: end that run, or close that program") from None
+        lock = ProcessLock(
+            folder / hashlib.sha256(device.casefold().encode()).hexdigest()[:16], _own_name(), shared=True
+        )
+    except LockHeld as error:
+        raise DeviceNotFound(f"{device} is in use by {error.holder}: end that run, or close that program") from None
     except OSError as error:
         remedy = f"check the folder, or set another one in the environment variable {FOLDER}"
         raise DeviceNotFound(f"{device} cannot be locked in {folder} ({error.strerror or error}): {remedy}") from error
     try:
-        # the lock remains valid if the name cannot be written, as on a full disk
-        with suppress(OSError):
-            name.unlink(missing_ok=True)
-            name.write_text(_own_name(), encoding="utf-8")
         yield
     finally:
-        with suppress(OSError):
-            name.unlink(missing_ok=True)
         lock.release()
 
 
@@ -109,13 +100,3 @@ def _own_name() -> str:
     except (OSError, KeyError, ImportError):
         user = "unknown user"
     return f"{command} (process {os.getpid()}, {user}, since {time.strftime('%H:%M')})"
-
-
-def _holder(name: Path) -> str:
-    for _ in range(10):
-        with suppress(OSError):
-            if text := name.read_text(encoding="utf-8", errors="replace")[:200]:
-                return text
-        # the owner writes its name just after it has locked the file
-        time.sleep(0.02)
-    return "another program"

@@ -1,6 +1,6 @@
 """Agreement with other people's integrators and other routes, to the last digits that the problem has."""
 
-from functools import partial
+import json
 from math import cos, fsum, hypot, sin
 
 import numpy as np
@@ -10,75 +10,65 @@ from numpy.typing import NDArray
 from sim.excitation import SampledRecord, SineProgram, Sweep
 from sim.kernel import rocking as kernel
 from sim.rocking import State, simulate
-from sim.specimen import Block, Specimen
+from sim.specimen import Specimen
 from sim.steady import rocking_orbit
+from tests.sim.references import CASES, FILE, IRREGULAR, RECORD_STEP, STEADY, irregular_specimen, record, reference
 from tests.sim.runs import A_S, kernel_run
 
 
-@pytest.mark.parametrize(("beta", "omega"), [(0.64, 17.0), (0.40, 16.0), (0.25, 18.0), (0.97, 20.0)])
+@pytest.mark.parametrize(("beta", "omega"), STEADY)
 def test_two_minutes_of_steady_rocking_agree_with_heyoka(beta: float, omega: float) -> None:
     # measured: at most 5e-13 (with 1e-14), 1e-12 at omega 17 and 2e-11 at omega 18 with the default tolerance of 1e-10
-    pytest.importorskip("heyoka", reason="heyoka is not installed: uv pip install heyoka")
-    from tests.sim.oracle_heyoka import heyoka_motion
-
-    orbit = rocking_orbit(Specimen(beta=beta), omega, A_S)
-    expected, impacts = heyoka_motion(orbit.specimen, A_S, omega, orbit.phase, orbit.start.as_array(), 120.0)
-    drive = SineProgram([Sweep.dwell(120.0, A_S, omega)], phase=orbit.phase)
+    specimen = Specimen(beta=beta)
+    expected = reference(f"steady {beta} {omega}", specimen)
+    drive = SineProgram([Sweep.dwell(120.0, A_S, omega)], phase=expected["phase"])
     for tolerance, allowed in ((1e-14, 1e-12), (1e-10, 5e-11)):
-        motion = simulate(orbit.specimen, drive, state=orbit.start, tolerance=tolerance)
-        assert motion.impacts == len(impacts) > 600
-        assert motion.end.as_array() == pytest.approx(expected, rel=0.0, abs=allowed)
+        motion = simulate(specimen, drive, state=State.from_array(np.array(expected["start"])), tolerance=tolerance)
+        assert motion.impacts == expected["impacts"] > 600
+        assert motion.end.as_array() == pytest.approx(expected["end"], rel=0.0, abs=allowed)
 
 
-@pytest.mark.parametrize(("beta", "omega", "factor"), [(0.64, 17.0, 1.3), (0.25, 14.0, 1.1), (1.4, 19.0, 1.2)])
+@pytest.mark.parametrize(("beta", "omega", "factor"), IRREGULAR)
 def test_irregular_rocking_agrees_with_heyoka(beta: float, omega: float, factor: float) -> None:
     # measured: 2e-14 over 3 s, and as much over 10 s where the motion stays bounded
-    pytest.importorskip("heyoka", reason="heyoka is not installed: uv pip install heyoka")
-    from tests.sim.oracle_heyoka import heyoka_motion
-
-    specimen = Specimen(beta=beta, block=Block(restitution_factor=0.992), d=0.15)
-    start = np.array([0.005, -0.003, 0.02, 0.05, 0.02, -0.1])
-    expected, impacts = heyoka_motion(specimen, factor * A_S, omega, 0.3, start, 3.0)
-    drive = SineProgram([Sweep.dwell(3.0, factor * A_S, omega)], phase=0.3)
-    motion = simulate(specimen, drive, state=State.from_array(start), tolerance=1e-14)
-    assert motion.impacts == len(impacts) >= 8
-    assert motion.end.as_array() == pytest.approx(expected, rel=0.0, abs=1e-12)
+    specimen = irregular_specimen(beta)
+    expected = reference(f"irregular {beta} {omega}", specimen)
+    drive = SineProgram([Sweep.dwell(3.0, factor * A_S, omega)], phase=expected["phase"])
+    motion = simulate(specimen, drive, state=State.from_array(np.array(expected["start"])), tolerance=1e-14)
+    assert motion.impacts == expected["impacts"] >= 8
+    assert motion.end.as_array() == pytest.approx(expected["end"], rel=0.0, abs=1e-12)
 
 
 def test_uplift_and_impacts_agree_with_thirty_digits() -> None:
     # from rest under a sine: one uplift, five impacts; measured 8e-16
-    mp = pytest.importorskip("mpmath", reason="mpmath is not installed: uv pip install mpmath")
-    from tests.sim.oracle_mpmath import DIGITS, exact_motion
-
-    specimen, amplitude, omega, duration = Specimen(beta=0.64), 1.3 * A_S, 17.0, 1.2
-    with mp.workdps(DIGITS):
-        base = [lambda t: mp.mpf(amplitude) * mp.sin(mp.mpf(omega) * t)]
-        run = partial(exact_motion, specimen, base, [mp.mpf(0), mp.mpf(duration)], [0] * 6)
-        (coarse, _, _), (exact, uplifts, impacts) = run(0.06), run(0.04)
-        assert max(abs(a - b) for a, b in zip(coarse, exact, strict=True)) < 1e-18  # the reference holds its digits
-    motion = simulate(specimen, SineProgram([Sweep.dwell(duration, amplitude, omega)]), tolerance=1e-14)
-    assert (len(uplifts), motion.impacts) == (1, len(impacts)) == (1, 5)
-    assert motion.end.as_array() == pytest.approx([float(value) for value in exact], rel=0.0, abs=1e-14)
+    specimen = Specimen(beta=0.64)
+    exact = reference("uplift and impacts", specimen)
+    motion = simulate(specimen, SineProgram([Sweep.dwell(1.2, 1.3 * A_S, 17.0)]), tolerance=1e-14)
+    assert (exact["uplifts"], motion.impacts) == (1, exact["impacts"]) == (1, 5)
+    assert motion.end.as_array() == pytest.approx([*map(float, exact["end"])], rel=0.0, abs=1e-14)
 
 
 def test_a_record_agrees_with_thirty_digits() -> None:
     # breakpoints on every sample; measured 6e-17
-    mp = pytest.importorskip("mpmath", reason="mpmath is not installed: uv pip install mpmath")
-    from tests.sim.oracle_mpmath import DIGITS, Number, exact_motion
+    specimen = Specimen(beta=0.64)
+    exact = reference("record", specimen)
+    motion = simulate(specimen, SampledRecord(record(), RECORD_STEP), tolerance=1e-14)
+    assert (exact["uplifts"], motion.impacts) == (1, exact["impacts"]) == (1, 2)
+    assert motion.end.as_array() == pytest.approx([*map(float, exact["end"])], rel=0.0, abs=1e-14)
 
-    specimen, dt = Specimen(beta=0.64), 0.05
-    values = 2.2 * np.sin(14.0 * dt * np.arange(25)) * np.linspace(0.3, 1.0, 25)
 
-    def line(i: int, t: Number) -> Number:
-        left, right = mp.mpf(float(values[i])), mp.mpf(float(values[i + 1]))
-        return left + (right - left) * (t - i * mp.mpf(dt)) / mp.mpf(dt)
-
-    with mp.workdps(DIGITS):
-        base, places = [partial(line, i) for i in range(24)], [i * mp.mpf(dt) for i in range(25)]
-        exact, uplifts, impacts = exact_motion(specimen, base, places, [0] * 6, dt)
-    motion = simulate(specimen, SampledRecord(values, dt), tolerance=1e-14)
-    assert (len(uplifts), motion.impacts) == (1, len(impacts)) == (1, 2)
-    assert motion.end.as_array() == pytest.approx([float(value) for value in exact], rel=0.0, abs=1e-14)
+@pytest.mark.soak
+@pytest.mark.parametrize("name", CASES)
+def test_stored_references_are_what_their_integrators_compute(name: str) -> None:
+    if name.startswith(("steady", "irregular")):
+        pytest.importorskip("heyoka", reason="heyoka is not installed: uv sync --all-groups")
+    stored, computed = json.loads(FILE.read_text(encoding="utf-8"))[name], CASES[name]()
+    assert stored["impacts"] == computed["impacts"]
+    # digits of mpmath; heyoka's rounding over two minutes depends on the processor
+    if "uplifts" in stored:
+        assert stored["end"] == computed["end"]
+    else:
+        assert stored["end"] == pytest.approx(computed["end"], rel=0.0, abs=5e-13)
 
 
 def stored_energy(specimen: Specimen, corner: float, x: NDArray[np.float64]) -> float:

@@ -1,7 +1,8 @@
 """The kernel's cache: never the code of other sources, never from a folder that others can write, never for ever.
 
 Each run is a process of its own, on a copy of the kernel with two small functions more: one in `caller` that calls one
-in `callee`, because numba by itself does not notice that the callee was edited.
+in `callee`, because numba by itself does not notice that the callee was edited. All but a few are forked from a process
+that has imported numba.
 """
 
 import os
@@ -10,13 +11,14 @@ import shutil
 import subprocess
 import sys
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import pytest
 from _pytest.mark import ParameterSet
 
 import sim.kernel
+from tests.forked import Programs
 
 posix = pytest.mark.skipif(sys.platform == "win32", reason="permissions of POSIX")
 root = pytest.mark.skipif(
@@ -46,14 +48,27 @@ from sim.kernel.compiled import compiled
 def callee(x):
     return kernels(x) + {term}
 """
+FUNCTION = """@compiled("float64(float64)")
+def {name}(x):
+    return caller(x) * 2.0
+"""
 ASK = "from sim.kernel.caller import caller; print(caller(1.0))"
 NOTICE = "compiled in memory"
+PRELOAD = """import os, sys
+sys.modules["scipy"] = None
+os.environ.update(NUMBA_OPT="2", NUMBA_LOOP_VECTORIZE="0", NUMBA_SLP_VECTORIZE="0")
+import concurrent.futures, multiprocessing, numba
+numba.njit("float64(float64)", nogil=True, error_model="numpy", no_cfunc_wrapper=True)(lambda x: 2.0 * x + 1.0)
+"""
+"""numba with the settings of sim.kernel, and what every first compilation loads."""
+PREPARE = "import numba; numba.core.config.reload_config(); del numba"
 
 
 class Installation:
     """A copy of the kernel, with its own home and environment."""
 
-    def __init__(self, place: Path) -> None:
+    def __init__(self, place: Path, programs: Programs) -> None:
+        self.programs = programs
         self.site, self.home = place / "site", place / "home"
         self.kernel = self.site / "sim" / "kernel"
         self.home.mkdir()
@@ -81,18 +96,22 @@ class Installation:
         shutil.rmtree(self.home)
         self.home.touch()
 
-    def run(self, code: str = ASK) -> tuple[str, str]:
-        """What the process prints to standard output and standard error."""
-        done = subprocess.run(
-            [sys.executable, "-c", code], env=self.environment, cwd=self.site, capture_output=True, text=True
-        )
+    def run(self, code: str = ASK, *, fresh: bool = False) -> tuple[str, str]:
+        """What the process prints to standard output and standard error; `fresh`: it imports numba itself."""
+        done = self.programs.run(code, self.environment, self.site, fresh=fresh)
         assert done.returncode == 0, done.stderr
         return done.stdout.strip(), done.stderr.strip()
 
 
+@pytest.fixture(scope="module")
+def programs() -> Iterator[Programs]:
+    with Programs(PRELOAD, PREPARE) as ready:
+        yield ready
+
+
 @pytest.fixture
-def installation(tmp_path: Path) -> Installation:
-    return Installation(tmp_path)
+def installation(tmp_path: Path, programs: Programs) -> Installation:
+    return Installation(tmp_path, programs)
 
 
 Choice = Callable[[Installation], Path]
@@ -119,7 +138,7 @@ def test_whatever_imports_numba_first_finds_the_kernels_settings(installation: I
         "import os, sys\nsys.modules['numba'] = None\ntry:\n    import sim.kernel.table\n"
         "except ImportError:\n    print(os.environ.get('NUMBA_OPT'), os.environ.get('NUMBA_LOOP_VECTORIZE'))"
     )
-    assert installation.run(code) == ("2 0", "")
+    assert installation.run(code, fresh=True) == ("2 0", "")
 
 
 def test_a_package_that_calls_the_kernel_is_compiled_again_after_an_edit_there_and_in_itself(
@@ -147,14 +166,16 @@ def test_a_package_that_calls_the_kernel_is_compiled_again_after_an_edit_there_a
 @pytest.mark.parametrize("choose", [beside, at_home, where_the_user_says])
 def test_an_edited_kernel_is_compiled_again_wherever_the_cache_is(installation: Installation, choose: Choice) -> None:
     place = choose(installation)
-    assert installation.run() == ("3.0", "")
+    # numba reads where the user says when it is imported
+    fresh = choose is where_the_user_says
+    assert installation.run(fresh=fresh) == ("3.0", "")
     made = set(place.rglob("*.nbc"))
     assert len(made) == 2
     installation.edit(30.0)
-    assert installation.run() == ("31.0", "")
+    assert installation.run(fresh=fresh) == ("31.0", "")
     # and back: what was compiled first is still there
     installation.edit(2.0)
-    assert installation.run() == ("3.0", "")
+    assert installation.run(fresh=fresh) == ("3.0", "")
     assert made < set(place.rglob("*.nbc"))
     assert len(list(place.rglob("*.nbc"))) == 4
 
@@ -212,10 +233,15 @@ def test_an_update_while_the_kernel_is_loaded_leaves_nothing_behind(installation
     assert installation.run() == ("3.0", "")
 
 
-def test_threads_that_load_parts_of_the_kernel_together(installation: Installation) -> None:
+@pytest.mark.parametrize("parts", [("first", "second"), long(("roots", "equations"))])
+def test_threads_that_load_parts_of_the_kernel_together(installation: Installation, parts: Sequence[str]) -> None:
+    for part in {"first", "second"} & {*parts}:
+        functions = "".join(FUNCTION.format(name=f"{part}{number}") for number in range(5))
+        (installation.kernel / f"{part}.py").write_text(CALLER + functions)
+    modules = [f"sim.kernel.{part}" for part in ("caller", *parts)]
     code = (
         "from concurrent.futures import ThreadPoolExecutor as P; from importlib import import_module as i\n"
-        "with P(3) as pool: list(pool.map(i, ['sim.kernel.caller', 'sim.kernel.roots', 'sim.kernel.equations']))\n"
+        f"with P(3) as pool: list(pool.map(i, {modules}))\n"
     )
     assert installation.run(code + ASK) == ("3.0", "")
     outside = [path for path in installation.site.parent.rglob("*.nb?") if "rockbench-" not in str(path)]

@@ -31,9 +31,9 @@ def announced(server: SessionServer, run: Run, owner: str) -> Generator[None]:
         return
     began, key, operator = time.time(), secrets.token_bytes(32), run.about.get("operator", "")
     path = folder / f"{os.getpid()}-{key[:4].hex()}.json"
-    lock = lock_of(path)
+    lock = None
     try:
-        lock.acquire()
+        lock = lock_of(path)
         listener = Listener()
         session = RunningSession(
             os.getpid(),

@@ -4,7 +4,8 @@ time.
 
 import threading
 from collections import deque
-from collections.abc import Hashable
+from collections.abc import Hashable, Iterable
+from itertools import chain
 
 import numpy as np
 
@@ -63,8 +64,9 @@ class SendQueue:
     traces and twin estimates and the newest other events, and counts the losses. The data file is complete regardless.
     """
 
-    def __init__(self, events: int = EVENTS, traces: int = TRACES) -> None:
-        self._events, self._traces = deque[FromSession](), deque[Traces]()
+    def __init__(self, events: int = EVENTS, traces: int = TRACES, first: Iterable[FromSession] = ()) -> None:
+        """`first` are messages other than traces and twin estimates, with which the queue begins even if full."""
+        self._events, self._traces = deque[FromSession](first), deque[Traces]()
         self._twin = deque[FromSession](maxlen=traces)
         self._most_events, self._most_traces = events, traces
         self._changed = threading.Condition()
@@ -129,11 +131,10 @@ class Broadcast:
 
     def join(self, *first: FromSession) -> SendQueue:
         """Queue of a new client, which begins with the messages `first` and the run so far."""
-        queue = SendQueue()
         with self._lock:
             opened = () if self._opened is None else (self._opened,)
-            for message in (*first, *opened, *self._journal, *self._last.values()):
-                queue.put(message, always=True)
+            # one copy of references, because the engine's thread waits for this lock
+            queue = SendQueue(first=chain(first, opened, self._journal, self._last.values()))
             self._queues.append(queue)
         return queue
 

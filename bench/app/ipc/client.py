@@ -27,6 +27,7 @@ from bench.app.ipc.messages import (
     Note,
     PlanCheck,
     PlanChecked,
+    ReadOnly,
     Refused,
     Run,
     Traces,
@@ -225,10 +226,16 @@ class SessionClient(ClientConnection):
 
 
 class AttachedClient(ClientConnection):
-    """A further client of a session that another client, or a terminal, has started."""
+    """A further client of a session that another client, or a terminal, has started; with `read_only`, the session
+    ignores its requests.
+    """
 
-    def __init__(self, session: RunningSession, on_message: Callable[[], None] = lambda: None) -> None:
+    def __init__(
+        self, session: RunningSession, on_message: Callable[[], None] = lambda: None, *, read_only: bool = False
+    ) -> None:
         super().__init__(Path(session.out), on_message)
+        if read_only:
+            self._outgoing.put(ReadOnly())
         self._talking = threading.Thread(target=self._talk, args=(session,), name="link", daemon=True)
         self._talking.start()
 

@@ -83,6 +83,11 @@ class Alive:
 
 
 @dataclass(frozen=True)
+class ReadOnly:
+    """The client only displays the run: it answers no question, and its requests are ignored."""
+
+
+@dataclass(frozen=True)
 class Leave:
     """The client disconnects in an orderly way."""
 
@@ -272,7 +277,7 @@ FromSession = (
     | Ended
     | Refused
 )
-FromClient = Ask | Answer | Note | Alive | Leave
+FromClient = Ask | Answer | Note | Alive | ReadOnly | Leave
 
 
 def receive(connection: Connection) -> object | None:

@@ -30,6 +30,7 @@ from bench.app.ipc.messages import (
     Preparing,
     Published,
     Question,
+    ReadOnly,
     Refused,
     SafetyInputs,
     receive,
@@ -193,6 +194,7 @@ class SessionServer:
             self._lose_client("the client has disconnected")
 
     def _receive_attached(self, connection: Connection, queue: SendQueue) -> None:
+        read_only = False
         try:
             with suppress(EOFError, OSError):
                 while True:
@@ -201,9 +203,13 @@ class SessionServer:
                         self._attending.discard(queue)
                         continue
                     message = receive(connection)
-                    self._attending.add(queue)
                     if isinstance(message, Leave):
                         break
+                    read_only = read_only or isinstance(message, ReadOnly)
+                    if read_only:
+                        self._attending.discard(queue)
+                        continue
+                    self._attending.add(queue)
                     # while the owner is present, no other client controls the run, but every client may stop it
                     stops = isinstance(message, Ask) and message.end in ("abort", "halt")
                     if not self.connected or isinstance(message, Note) or stops:

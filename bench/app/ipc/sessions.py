@@ -13,7 +13,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from filelock import FileLock, Timeout
+from sim.process_lock import LockHeld, ProcessLock
 
 FOLDER = "ROCKBENCH_SESSIONS"
 """Environment variable that names the folder of the announcements; "off" disables them."""
@@ -70,10 +70,9 @@ def running_sessions() -> list[RunningSession]:
     """Sessions under way, the newest first, those of real benches before all others."""
     folder, found = sessions_folder(), list[RunningSession]()
     for path in () if folder is None else folder.glob("*.json"):
-        lock = lock_of(path)
         try:
-            lock.acquire()
-        except Timeout:
+            lock = lock_of(path)
+        except LockHeld:
             with suppress(OSError, ValueError, TypeError):
                 found.append(RunningSession(**json.loads(path.read_text(encoding="utf-8"))))
         except OSError:
@@ -83,16 +82,14 @@ def running_sessions() -> list[RunningSession]:
     return sorted(found, key=lambda each: (each.real, each.began), reverse=True)
 
 
-def lock_of(path: Path) -> FileLock:
-    """Lock of an announcement; it is a separate file, since a locked file cannot be read on Windows."""
-    return FileLock(path.with_suffix(".lock"), blocking=False, thread_local=False, fallback_to_soft=False)
+def lock_of(path: Path) -> ProcessLock:
+    """Lock the announcement `path`. Raises LockHeld while its session runs, and OSError."""
+    return ProcessLock(path.with_suffix(""))
 
 
-def remove(path: Path, lock: FileLock) -> None:
+def remove(path: Path, lock: ProcessLock | None) -> None:
     """Remove an announcement and its lock."""
     with suppress(OSError):
         path.unlink(missing_ok=True)
-    if lock.is_locked:
-        lock.release()
-    with suppress(OSError):
-        path.with_suffix(".lock").unlink(missing_ok=True)
+    if lock is not None:
+        lock.release(remove=True)

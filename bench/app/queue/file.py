@@ -3,7 +3,7 @@
 import json
 import os
 from collections.abc import Generator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, cast
 
@@ -13,6 +13,7 @@ from bench.config.validation import dotted, validated
 from bench.unfinished import replace
 from sim.errors import InvalidInput
 from sim.parameters import Parameters, quantity
+from sim.process_lock import LockHeld, ProcessLock
 
 ITEM = "queue file"
 FORMAT, VERSION = "rocking-bench queue", 1
@@ -85,51 +86,35 @@ class QueueFile:
         except FileNotFoundError:
             return None
         except UnicodeDecodeError:
-            raise InvalidInput(ITEM, str(self.path), "the file cannot be read: it is not UTF-8 text") from None
+            raise InvalidInput(
+                ITEM, str(self.path), "it is not UTF-8 text: save it as UTF-8, or choose another file"
+            ) from None
         except (OSError, ValueError) as error:
             why = error.strerror if isinstance(error, OSError) else str(error)
-            raise InvalidInput(ITEM, str(self.path), f"the file cannot be read: {why}") from None
+            raise InvalidInput(
+                ITEM, str(self.path), f"the file cannot be read ({why}); check its permissions, or choose another file"
+            ) from None
 
 
 class Owner:
     """Ownership of the queue in `path` until `release`; `who` is the owner's name as shown by other programs. The lock
-    is on a separate, permanent file, because the queue file is replaced at each change. The name is in a second file,
-    because a locked file cannot be read on Windows. Raises InvalidInput naming the current owner, or the reason why the
-    queue cannot be locked.
+    is on a separate, permanent file, because the queue file is replaced at each change. Raises InvalidInput naming the
+    current owner, or the reason why the queue cannot be locked.
     """
 
     def __init__(self, path: Path, who: str) -> None:
-        from filelock import FileLock, Timeout
-
-        # the existence of a file cannot serve as a lock, because the file would outlive a crashed program
-        self._lock = FileLock(
-            path.with_name(f"{path.name}.lock"), blocking=False, thread_local=False, fallback_to_soft=False
-        )
-        self._name = path.with_name(f"{path.name}.owner")
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            self._lock.acquire()
-        except Timeout:
-            raise InvalidInput(ITEM, str(path), f"it is in use by {self._other()}: {REMEDY}") from None
+            self._lock = ProcessLock(path, f"{who} (process {os.getpid()})")
+        except LockHeld as error:
+            raise InvalidInput(ITEM, str(path), f"it is in use by {error.holder}: {REMEDY}") from None
         except OSError as error:
-            reason = f"{self._lock.lock_file} cannot be locked: {error.strerror or error}"
+            reason = f"{path}.lock cannot be locked: {error.strerror or error}; choose another folder"
             raise InvalidInput(ITEM, str(path), reason) from None
-        # on a full disk the owner's name is missing, but the lock still works
-        with suppress(OSError):
-            self._name.write_text(f"{who} (process {os.getpid()})", encoding="utf-8")
 
     def release(self) -> None:
         """Release the lock; may be called repeatedly."""
-        if self._lock.is_locked:
-            with suppress(OSError):
-                self._name.unlink(missing_ok=True)
-            self._lock.release()
-
-    def _other(self) -> str:
-        try:
-            return self._name.read_text(encoding="utf-8", errors="replace") or "another program"
-        except OSError:
-            return "another program"
+        self._lock.release()
 
 
 @contextmanager

@@ -36,7 +36,7 @@ def test_the_table_says_its_units(tmp_path: Path) -> None:
         group = file["entry/instrument/alignments"]
         units = {name: group[name].attrs["units"] for name in group if name != "sensor"}
         assert file["entry/complete"][5] == 1
-    seconds = ("offset", "residual", "delay")
+    seconds = ("offset", "residual", "delay", "mark_uncertainty")
     assert units == {
         **dict.fromkeys(("run", "rate", "values", "lost", "late", "implausible"), "1"),
         **dict.fromkeys(seconds, "s"),

@@ -14,7 +14,6 @@ from bench.app.cli.terminal import PlainLines
 from bench.app.export.format import content_of
 from bench.app.run_display import RunDisplay, notice_of
 from bench.datafile.declared import EVENT_TABLES, counters
-from bench.datafile.hdf5_reading import DataFileError
 from bench.datafile.reader import open_datafile
 from bench.datafile.recovery import recover
 from bench.datafile.writer import journal_path
@@ -112,11 +111,57 @@ def test_rows_that_only_the_journal_has_are_recovered(tmp_path: Path) -> None:
         assert kept.rows_of(Tone)[1] == columns
 
 
-def test_an_event_that_the_protocol_does_not_name_is_refused(tmp_path: Path) -> None:
-    recorder = begin(tmp_path / "campaign.h5")
-    with pytest.raises(DataFileError, match="Tone was not recorded: name it in `events`"):
-        recorder(Tone(0.25, time=1.0))
+@pytest.mark.parametrize("column", ["level", "loud", "time"])
+def test_a_lost_column_of_a_table_of_a_protocol_is_restored_from_the_journal(tmp_path: Path, column: str) -> None:
+    path, copy = tmp_path / "campaign.h5", tmp_path / "recovered.h5"
+    record(begin(path, events=(Tone,)), block(0, 10), Tone(0.25, time=1.0), Tone(0.5, True, time=2.0))
+    with h5py.File(path, "r+") as file:
+        # an unknown kind of column cannot be read
+        file[f"entry/tones/{column}"].attrs["kind"] = "unknown"
+    assert recover(path, copy).lost == {}
+    with open_datafile(copy) as kept:
+        assert [row["level"] for row in kept.rows_of(Tone)] == [0.25, 0.5]
+        assert [row["loud"] for row in kept.rows_of(Tone)] == [False, True]
+        assert kept.integrity(None).failing == {}
+        exported = content_of(kept, copy, raw=False).tables["tones"]
+        assert [(each.name, each.unit) for each in exported] == [("time", "s"), ("level", "m"), ("loud", "")]
+
+
+@event(table="unlisted", journalled=False)
+class Frequent(Event):
+    """An event with a table that is not stored in the journal."""
+
+    value: float = column("1", "a value")
+
+
+@event(table="invalid")
+class Invalid(Event):
+    """An event whose column has no type of the file."""
+
+    value: Path = column("1", "a path")
+
+
+def test_events_that_the_protocol_does_not_list_are_recorded_in_the_journal_with_one_warning(tmp_path: Path) -> None:
+    path, copy = tmp_path / "campaign.h5", tmp_path / "recovered.h5"
+    recorder, published = begin(path), list[Event]()
+    stream = EventStream(VirtualClock(), [recorder, published.append], recorder.stores)
+    stream.publish(block(0, 10))
+    for each in (Tone(0.25), Tone(0.5), Frequent(0.75), Invalid(Path("p"))):
+        stream.publish(each)
     recorder.close("completed")
+    warnings = [each.text for each in published if isinstance(each, Warned)]
+    assert len(warnings) == 3
+    assert f"list it in `events` of its protocol, as '{__name__}:Tone'" in warnings[0]
+    recover(path, copy)
+    for each in (path, copy):
+        with open_datafile(each) as kept:
+            lines = [(entry.kind, entry.text) for entry in kept.events if entry.kind != "Warned"]
+            assert lines[:2] == [("Tone", "level = 0.25, loud = False"), ("Tone", "level = 0.5, loud = False")]
+            assert lines[2:] == [("Frequent", "value = 0.75"), ("Invalid", "value = p")]
+            assert kept.own_tables == []
+
+
+def test_a_table_with_the_name_of_the_points_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InvalidInput, match="points"):
         begin(tmp_path / "other.h5", events=(event(table="points")(type("Points", (Tone,), {"__doc__": "x"})),))
 

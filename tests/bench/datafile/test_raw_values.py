@@ -2,9 +2,11 @@
 
 from pathlib import Path
 
+import h5py  # pyright: ignore[reportMissingTypeStubs]
 import numpy as np
 import pytest
 
+from bench.datafile.hdf5 import PAGE
 from bench.datafile.reader import open_datafile
 from bench.datafile.recovery import recover
 from bench.events import Acquired, Event, SensorsAligned, ValuesReceived
@@ -71,6 +73,19 @@ def test_every_value_is_in_the_file_and_samples_that_were_late_are_found_again(t
         with pytest.raises(InvalidInput, match=r"laser_1.*run 2.*channels with them: laser_1"):
             kept.resampled("laser_1", 2)
         assert not kept.integrity(None).failing
+
+
+def test_complete_chunks_leave_no_remainder_of_a_page(tmp_path: Path) -> None:
+    """HDF5 describes every remainder in memory until the file is closed."""
+    path = tmp_path / "campaign.h5"
+    record(begin(path, channels=[LASER]), *stream(200))
+    with h5py.File(path, "r") as file:
+        for name in ("laser_1/counts", "drive/voltage", "raw_values/index", "raw_values/code"):
+            stored = file[f"entry/instrument/{name}"]
+            whole = len(stored) // stored.chunks[0]
+            sizes = [stored.id.get_chunk_info(number).size for number in range(whole)]
+            assert whole
+            assert all(size % PAGE == 0 or (size < PAGE and size.bit_count() == 1) for size in sizes), (name, sizes)
 
 
 def test_they_take_less_than_preflight_reserves(tmp_path: Path) -> None:

@@ -64,7 +64,7 @@ def writer(path: Path, mode: str) -> Generator[subprocess.Popen[str]]:
 
 
 @POSIX_ONLY
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.soak) for seed in range(1, 4))])
 def test_what_was_flushed_survives_a_killed_writer(tmp_path: Path, seed: int) -> None:
     path, rng = tmp_path / "campaign.h5", np.random.default_rng(seed)
     with writer(path, "pace") as process:

@@ -1,5 +1,7 @@
 """A map of several blocks continues after an interruption, with the bytes of one that was not interrupted."""
 
+import os
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -7,7 +9,7 @@ import pytest
 
 from bench.app.cli.main import main
 from bench.datafile.tables import Column
-from bench.prediction.map_store import STATE, MapStore
+from bench.prediction.map_store import STATE, MapStore, discard
 from sim import map_rows
 from sim.errors import InvalidInput
 from sim.map_rows import Continuation
@@ -78,16 +80,19 @@ def test_rows_of_other_inputs_are_discarded(tmp_path: Path) -> None:
     store = MapStore(folder, {"omega": 1})
     store.append(table(1.0, 2.0), state(1))
     store.append(table(3.0), state(2))
+    store.close()
     again = MapStore(folder, {"omega": 1})
     assert again.after is not None
     assert again.after.rows == 2
     assert again.table()["alpha_2"].values.tolist() == [1.0, 2.0, 3.0]
     assert again.table()["layer"].values.tolist() == ["rocking"] * 3
+    again.close()
     other = MapStore(folder, {"omega": 2})
     assert other.after is None
     other.append(table(5.0), state(1))
     assert other.table()["alpha_2"].values.tolist() == [5.0]
     (folder / STATE).write_bytes(b"PK damaged")
+    other.close()
     assert MapStore(folder, {"omega": 2}).after is None
 
 
@@ -100,14 +105,40 @@ def test_a_folder_of_others_is_not_removed(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("inputs", [{"omega": 1}, {"omega": 2}])
-def test_two_processes_do_not_mix_their_rows(tmp_path: Path, inputs: object) -> None:
+def test_a_second_process_is_refused_until_the_first_has_ended(tmp_path: Path, inputs: object) -> None:
     folder = tmp_path / "map"
     first = MapStore(folder, {"omega": 1})
+    with pytest.raises(InvalidInput, match=rf"process {os.getpid()} writes its map there"):
+        MapStore(folder, inputs)
     first.append(table(1.0, 2.0), state(1))
+    discard(folder)
+    assert first.table()["alpha_2"].values.tolist() == [1.0, 2.0]
+    first.close()
     second = MapStore(folder, inputs)
-    second.append(table(8.0, 9.0), state(1))
-    with pytest.raises(InvalidInput, match="another process writes its map there"):
-        first.append(table(3.0), state(2))
-    with pytest.raises(InvalidInput, match="another process writes its map there"):
-        first.table()
-    assert second.table()["alpha_2"].values.tolist()[-2:] == [8.0, 9.0]
+    assert (second.after is None) == (inputs != {"omega": 1})
+    second.close()
+    # without rows the folder is removed
+    assert folder.exists() == (inputs == {"omega": 1})
+
+
+def test_rows_of_an_earlier_map_are_removed_by_one_that_stores_none(tmp_path: Path) -> None:
+    folder = tmp_path / ".small.h5.unfinished"
+    store = MapStore(folder, {"omega": 1})
+    store.append(table(1.0), state(1))
+    store.close()
+    small = ["predict", "map", "--omega", "14:20:3", "--beta", "0.2:0.9:3", "--out", str(tmp_path / "small.h5")]
+    assert main(small) == 0
+    assert files(tmp_path) == {"small.h5"}
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the list of mapped files is that of Linux")
+def test_no_file_is_mapped_when_the_folder_is_removed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    mapped, remove = list[bool](), MapStore.remove
+
+    def observed(store: MapStore) -> None:
+        remove(store)
+        mapped.append(str(store.folder) in Path("/proc/self/maps").read_text(encoding="utf-8"))
+
+    monkeypatch.setattr(MapStore, "remove", observed)
+    assert main([*LINE[:-1], "--out", str(tmp_path / "map.h5"), "--plot", str(tmp_path / "map.png")]) == 0
+    assert mapped == [False]

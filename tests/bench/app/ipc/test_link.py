@@ -66,6 +66,10 @@ class Client:
         self.until(lambda: self.link.process.poll() is not None)
         time.sleep(0.1)
         self.turn()
+        return self.over()
+
+    def over(self) -> FromSession:
+        """The last message of a session."""
         return next(message for message in self.heard if isinstance(message, Ended | Refused | PlanChecked))
 
     def states(self) -> list[State]:
@@ -78,9 +82,18 @@ class Client:
         self.until(lambda: State.RUNNING in self.states())
 
 
-def test_a_run_over_the_link_is_the_run_of_the_command_line(tmp_path: Path) -> None:
-    client = Client(begun(tmp_path / "linked", realtime=False, cycles=6))
-    ended = client.until_over()
+@pytest.fixture(scope="module")
+def linked(tmp_path_factory: pytest.TempPathFactory) -> tuple[Client, Path]:
+    """A short run that is over, with all that it sent, and its file."""
+    folder = tmp_path_factory.mktemp("linked")
+    client = Client(begun(folder, realtime=False, cycles=6))
+    client.until_over()
+    return client, folder / FILE
+
+
+def test_a_run_over_the_link_is_the_run_of_the_command_line(linked: tuple[Client, Path], tmp_path: Path) -> None:
+    client, file = linked
+    ended = client.over()
     direct = run_session(
         SHAKING,
         Shaking(ShakingParameters(cycles=6), bench()),
@@ -93,7 +106,7 @@ def test_a_run_over_the_link_is_the_run_of_the_command_line(tmp_path: Path) -> N
     )
     assert isinstance(ended, Ended)
     assert (ended.status, ended.reason, ended.table) == (direct.status, direct.reason, direct.table)
-    with open_datafile(tmp_path / "linked" / FILE) as one, open_datafile(tmp_path / "direct" / FILE) as other:
+    with open_datafile(file) as one, open_datafile(tmp_path / "direct" / FILE) as other:
         np.testing.assert_array_equal(one.drive(), other.drive())
         assert one.metadata == other.metadata
         assert [event.text for event in one.events] == [event.text for event in other.events]
@@ -110,12 +123,11 @@ def test_a_run_over_the_link_is_the_run_of_the_command_line(tmp_path: Path) -> N
     assert client.link.status == "over"
 
 
-def test_traces_enclose_the_recorded_samples(tmp_path: Path) -> None:
-    client = Client(begun(tmp_path, realtime=False, cycles=6))
-    client.until_over()
+def test_traces_enclose_the_recorded_samples(linked: tuple[Client, Path]) -> None:
+    client, file = linked
     traces = [message for message in client.heard if isinstance(message, Traces)]
     assert len(traces) > 10
-    with open_datafile(tmp_path / FILE) as record:
+    with open_datafile(file) as record:
         recorded = record.drive()
     low, high = (np.concatenate([getattr(each, side)[:, 0] for each in traces]) for side in ("low", "high"))
     # two samples a bin at 1000 samples/s, none lost in this short run
@@ -126,24 +138,33 @@ def test_traces_enclose_the_recorded_samples(tmp_path: Path) -> None:
     np.testing.assert_allclose(rows, 0.05, atol=1e-9)
 
 
-def test_a_plan_check_opens_nothing(tmp_path: Path) -> None:
-    client = Client(SessionClient(PlanCheck("shaking", ShakingParameters(), bench(), tmp_path / "run")))
+def test_a_plan_check_opens_nothing_calls_whoever_waits_and_leaves_no_thread(tmp_path: Path) -> None:
+    before, called = set(threading.enumerate()), threading.Event()
+    check = PlanCheck("shaking", ShakingParameters(), bench(), tmp_path / "run")
+    client = Client(SessionClient(check, called.set))
+    assert called.wait(60.0)
+    client.turn()
+    assert client.heard
     found = client.until_over()
     assert isinstance(found, PlanChecked)
     assert (found.refusal, list(found.prediction)) == (None, ["value"])
     assert not (tmp_path / "run").exists()
+    end = time.monotonic() + 5.0
+    while (left := set(threading.enumerate()) - before) and time.monotonic() < end:
+        time.sleep(0.01)
+    assert not left
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no signal ends a wait there")
-@pytest.mark.parametrize("end", ["stop", "abort", "halt"])
+@pytest.mark.parametrize(
+    "end", ["abort", pytest.param("stop", marks=pytest.mark.soak), pytest.param("halt", marks=pytest.mark.soak)]
+)
 def test_an_end_that_is_asked_for_breaks_the_planning_off(
     tmp_path: Path, end: Literal["stop", "abort", "halt"]
 ) -> None:
     """The paper's whole campaign, whose plan takes many seconds."""
     client = Client(SessionClient(Run("harmonic", HarmonicParameters(), BenchConfiguration(), tmp_path / "run")))
-    client.until(lambda: any(isinstance(message, Beat) for message in client.heard))
-    linked = time.monotonic()
-    client.until(lambda: time.monotonic() - linked > 3.0)
+    client.until(lambda: any(isinstance(message, Preparing) and message.done for message in client.heard))
     client.link.ask(end)
     took = client.until(lambda: client.link.process.poll() is not None)
     refused = client.until_over()
@@ -255,23 +276,6 @@ def test_extremes_are_those_of_each_bin() -> None:
     low, high = extremes(values, 2)
     np.testing.assert_array_equal(low[:, 0], [1.0, -2.0, np.nan, 7.0])
     np.testing.assert_array_equal(high[:, 0], [1.0, 3.0, np.nan, 7.0])
-
-
-def test_whoever_waits_is_called_when_there_is_something_to_take(tmp_path: Path) -> None:
-    called = threading.Event()
-    link = SessionClient(PlanCheck("shaking", ShakingParameters(), bench(), tmp_path / "run"), called.set)
-    assert called.wait(60.0)
-    assert link.take()
-
-
-def test_a_link_that_is_over_leaves_no_thread_and_no_handle(tmp_path: Path) -> None:
-    before = set(threading.enumerate())
-    client = Client(SessionClient(PlanCheck("shaking", ShakingParameters(), bench(), tmp_path / "run")))
-    assert isinstance(client.until_over(), PlanChecked)
-    end = time.monotonic() + 5.0
-    while (left := set(threading.enumerate()) - before) and time.monotonic() < end:
-        time.sleep(0.01)
-    assert not left
 
 
 def test_a_run_whose_last_word_was_lost_is_told_by_its_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
