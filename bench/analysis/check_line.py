@@ -65,13 +65,22 @@ def judged(
     )
 
 
-def stated(subject: str, what: str, measured: float, unit: str, *, uncertainty: float | None = None) -> CheckLine:
+def stated(
+    subject: str,
+    what: str,
+    measured: float,
+    unit: str,
+    *,
+    expected: float | None = None,
+    uncertainty: float | None = None,
+) -> CheckLine:
     """A line with a measured value but no tolerance."""
     return CheckLine(
         subject=subject,
         what=what,
         verdict=Verdict.STATED,
         measured=measured,
+        expected=expected,
         uncertainty=uncertainty,
         unit=unit,
     )

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import hypot, sqrt, tau
+from math import hypot, inf, sqrt, tau
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,10 @@ from bench.analysis.sensor_accuracy import Draws, PeakReadings, SensorUncertaint
 from bench.analysis.sensor_accuracy import SensorAccuracy as SensorAccuracy
 from bench.analysis.signals import ACCELERATION, DRIFT, LASER_1, LASER_2, U1
 from bench.analysis.uncertainty import COVERAGE as COVERAGE
-from bench.analysis.uncertainty import Budget
+from bench.analysis.uncertainty import Budget, combined_freedom
+
+SCATTER = "scatter of the cycles"
+"""Name of the contribution in a budget."""
 
 DRAWS, SEED = 4000, 1
 """Number of Monte Carlo draws of the sensors' errors; with this number, the expanded uncertainty has a statistical
@@ -55,7 +58,7 @@ class SteadyPeak:
     scatter of the cycles and to a remaining transient. `u1` [m] is the first storey's peak, `amplitude` [m/s2] the
     table's amplitude and `harmonics` the relative rms of the table's harmonics. `readings` are the lasers' readings at
     the peak, `cycles` is the number of cycles, and `checks` holds the harmonics of both lasers' readings in a test of
-    the bare frame.
+    the bare frame. `freedom` is the number of degrees of freedom of the scatter.
     """
 
     drift: float
@@ -67,6 +70,7 @@ class SteadyPeak:
     readings: PeakReadings
     cycles: int
     checks: Checks | None = None
+    freedom: float = inf
 
 
 @dataclass(frozen=True)
@@ -105,11 +109,12 @@ def steady_peak(
     waves = mean_waves(cycles, {DRIFT: PEAK_HARMONICS})
     every = mean_waves([*before, *cycles], {DRIFT: PEAK_HARMONICS}) if before else waves
     drift = float(waves.peaks[DRIFT])
-    scatter = _standard_error(waves.there[:, DRIFT])
+    scatter, freedom = _standard_error(waves.there[:, DRIFT])
     transient = hypot(remaining_transient(every.there[:, DRIFT], len(cycles)), residual * drift / sqrt(3.0))
     readings = _readings(waves, omega, drift, at_rest=False)
     checks = None if frame is None else _checks(cycles, waves, omega, frame)
-    return replace(_peak(cycles, waves, readings, scatter, transient, float(waves.peaks[U1])), checks=checks)
+    found = _peak(cycles, waves, readings, scatter, transient, float(waves.peaks[U1]))
+    return replace(found, checks=checks, freedom=freedom)
 
 
 def modulated_peak(cycles: Sequence[Cycle], omega: float) -> SteadyPeak:
@@ -122,7 +127,7 @@ def modulated_peak(cycles: Sequence[Cycle], omega: float) -> SteadyPeak:
     u1 = float(np.max([cycle.extreme[U1] for cycle in cycles]))
     waves = mean_waves(cycles)
     readings = _readings(waves, omega, float(peaks.max()), at_rest=True)
-    return _peak(cycles, waves, readings, scatter, 0.0, u1)
+    return replace(_peak(cycles, waves, readings, scatter, 0.0, u1), freedom=float(max(len(quarters) - 1, 1)))
 
 
 def _peak(
@@ -182,17 +187,18 @@ def _checks(cycles: Sequence[Cycle], waves: Waves, omega: float, frame: LinearFr
     return found[0], found[1]
 
 
-def _standard_error(series: NDArray[np.float64]) -> float:
+def _standard_error(series: NDArray[np.float64]) -> tuple[float, float]:
+    """Standard uncertainty of the mean of a correlated series, and its degrees of freedom."""
     if series.size < 3:
-        return float(np.ptp(series))
+        return float(np.ptp(series)), 1.0
     deviation = series - series.mean()
     variance = float(deviation @ deviation) / (series.size - 1)
     if variance == 0.0:
-        return 0.0
+        return 0.0, series.size - 1.0
     r1 = float(deviation[1:] @ deviation[:-1]) / ((series.size - 1) * variance)
     r1 = min(max(r1, 0.0), 0.95)
     effective = max(series.size * (1.0 - r1) / (1.0 + r1), 1.0)
-    return sqrt(variance / effective)
+    return sqrt(variance / effective), max(effective - 1.0, 1.0)
 
 
 def gain(
@@ -225,9 +231,20 @@ def gain(
     found = sensors.shapes(seen) if shapes is None else shapes
     errors = sensors.drift_errors(seen, draws, found)
     parts = {name: float(np.std(each[1] / coupled.drift - each[0] / bare.drift)) for name, each in errors.items()}
+    scatter = coupled.scatter / coupled.drift, bare.scatter / bare.drift
     parts |= {
-        "scatter of the cycles": hypot(coupled.scatter / coupled.drift, bare.scatter / bare.drift),
+        SCATTER: hypot(*scatter),
         "remaining transient": hypot(coupled.transient / coupled.drift, bare.transient / bare.drift),
         "amplitude of the table": abs(amplitude_slope) * sensors.table_scale,
     }
-    return Gain(alpha, Budget({name: alpha * value for name, value in parts.items()}), found)
+    freedom = {SCATTER: combined_freedom(zip(scatter, (coupled.freedom, bare.freedom), strict=True))}
+    # a running gain, which has shared draws, omits the correlations
+    correlations = {name: _correlation(each) for name, each in errors.items()} if shared is None else {}
+    return Gain(alpha, Budget({name: alpha * value for name, value in parts.items()}, freedom, correlations), found)
+
+
+def _correlation(errors: NDArray[np.float64]) -> float:
+    """Correlation of the errors in the two tests, shape (2, n); 0 without errors."""
+    centred = errors - errors.mean(axis=1, keepdims=True)
+    size = float(np.linalg.norm(centred[0]) * np.linalg.norm(centred[1]))
+    return float(centred[0] @ centred[1]) / size if size > 0.0 else 0.0

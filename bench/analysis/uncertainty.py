@@ -10,9 +10,9 @@ repeats, 91 % for three, and 93 % for five or more.
 """
 
 import json
-from collections.abc import Mapping
-from dataclasses import dataclass
-from math import floor, hypot, isfinite, log10
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from math import floor, hypot, inf, isfinite, log10
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -94,14 +94,23 @@ def _addition(values: Array, variances: Array) -> Array:
 COVERAGE = 2.0
 """Coverage factor k of every expanded uncertainty."""
 
+NORMAL = 1000.0
+"""Degrees of freedom from which on Student's t is not distinguished from the normal distribution."""
+
 
 @dataclass(frozen=True)
 class Budget:
     """Independent contributions to the uncertainty of one result: standard uncertainties in the unit of the result, by
     name.
+
+    `freedom` holds the degrees of freedom of the contributions for which they are finite. `correlations` are those
+    between the errors of two quantities whose ratio is the result: errors of correlation 1 and equal relative size
+    cancel.
     """
 
     parts: Mapping[str, float]
+    freedom: Mapping[str, float] = field(default_factory=dict[str, float])
+    correlations: Mapping[str, float] = field(default_factory=dict[str, float])
 
     @property
     def largest_first(self) -> dict[str, float]:
@@ -114,6 +123,11 @@ class Budget:
         return COVERAGE * hypot(*self.parts.values())
 
     @property
+    def effective_freedom(self) -> float:
+        """Effective degrees of freedom of the combined uncertainty (Welch and Satterthwaite, GUM G.4.1)."""
+        return combined_freedom([(part, self.freedom.get(name, inf)) for name, part in self.parts.items()])
+
+    @property
     def dominating(self) -> str:
         """Name of the largest contribution; empty if none is above zero."""
         name, value = next(iter(self.largest_first.items()), ("", 0.0))
@@ -123,6 +137,27 @@ class Budget:
     def as_json(self) -> str:
         """All contributions as JSON, largest first."""
         return json.dumps({name: float(f"{value:.3g}") for name, value in self.largest_first.items()})
+
+    @property
+    def fields(self) -> dict[str, str | float | None]:
+        """Columns of a result that describe its budget."""
+        freedom = self.effective_freedom
+        return {
+            "dominating": self.dominating,
+            "uncertainty_parts": self.as_json,
+            "uncertainty_correlations": json.dumps({name: round(r, 4) for name, r in self.correlations.items()}),
+            "degrees_of_freedom": freedom if freedom < NORMAL else None,
+        }
+
+
+def combined_freedom(parts: Iterable[tuple[float, float]]) -> float:
+    """Effective degrees of freedom of the root sum of squares of standard uncertainties, each with its own degrees of
+    freedom (Welch and Satterthwaite, GUM G.4.1).
+    """
+    known = [(part, freedom) for part, freedom in parts if part > 0.0]
+    total = hypot(*(part for part, _ in known))
+    weight = sum((part / total) ** 4 / freedom for part, freedom in known)
+    return 1.0 / weight if weight > 0.0 else inf
 
 
 def decimals(uncertainty: float) -> int | None:

@@ -40,7 +40,7 @@ from bench.figures.text_table import TextColumn, text_table
 from bench.protocol import Plan, Prepared, Result, Sources
 from drivers.rig import OperatorTask
 from protocols.check.comparison import Sines, allowed_delay, delay_lines, scale_lines, table_delay_lines
-from protocols.check.lines import drive_lines, expected_drive, input_lines, resting_lines, safety_lines
+from protocols.check.lines import alignment_lines, drive_lines, expected_drive, input_lines, resting_lines, safety_lines
 from protocols.check.protocol import MARKS, CheckParameters, allowed_range, number
 from protocols.common.calibrate import CHANGE_TIME, SETTLING, Unmeasurable, calibrate_drive, need_cycles, probed_drive
 from sim.errors import InvalidInput
@@ -128,6 +128,7 @@ def _steps(parameters: CheckParameters, configuration: BenchConfiguration) -> Ge
         resting.append(failed("table", "rest", f"{at_rest.violation} at zero drive: check amplifier and limits"))
     yield from _publish(resting)
     yield from _publish(input_lines(at_rest.channels))
+    yield from _publish(alignment_lines(at_rest.alignments, configuration))
     if any(line.verdict is Verdict.FAILED for line in resting):
         remedy = "the table was not moved: correct the failed lines, then check again"
         yield from _publish([untested("bench", "motion", remedy)])

@@ -12,7 +12,8 @@ from bench.analysis.gain import COVERAGE, SensorAccuracy
 from bench.config.model import BenchConfiguration
 from bench.engine.steps import RestSamples
 from drivers.optoncdt.codec import IMPLAUSIBLE, LATE, LOST
-from drivers.rig import Channel, Counts
+from drivers.rig import Alignment, Channel, Counts
+from drivers.timebase.marking import expected_uncertainty
 from protocols.check.comparison import Sines
 from protocols.check.protocol import CheckParameters
 from sim.channel import STOREYS, TABLE_ACCELERATION, TABLE_DISPLACEMENT
@@ -25,7 +26,7 @@ _FINEST = 1e-5
 
 _UNKNOWN = "the delay of this module is unknown: compare the delay lines, or use a supported module"
 _OF_THE_LINE = {
-    LATE: "the computer was busy, or the sensor is silent: close other programs, increase acquisition.block_duration,"
+    LATE: "the computer was busy, or the sensor is silent: close other programs, increase acquisition.lead,"
     " or check the sensor's power and port",
     LOST: "check the cable, the RS422 adapter and its latency timer",
     IMPLAUSIBLE: "bits were changed on the line: check the cable, its shield and the RS422 adapter",
@@ -80,6 +81,19 @@ def input_lines(channels: Sequence[Channel]) -> Iterator[CheckLine]:
             yield stated(channel.name, what, channel.delay, "s", uncertainty=COVERAGE * channel.delay_uncertainty)
 
 
+def alignment_lines(alignments: Sequence[Alignment], configuration: BenchConfiguration) -> Iterator[CheckLine]:
+    """Two lines for each sensor with its own clock: accuracy of the alignment by its method, and the delay added."""
+    expected = expected_uncertainty(configuration.hardware.lasers.rate)
+    for one in alignments:
+        if isinf(one.mark_uncertainty):
+            what = "alignment from arrival times, rms residual of the readings"
+            yield stated(one.sensor, what, one.residual, "s")
+        else:
+            what = "alignment by pulses of the counter, standard uncertainty"
+            yield stated(one.sensor, what, one.mark_uncertainty, "s", expected=expected)
+        yield stated(one.sensor, "delay added to its times", one.delay, "s")
+
+
 def drive_lines(sines: Sines, parameters: CheckParameters, configuration: BenchConfiguration) -> Iterator[CheckLine]:
     """Lines for the dead time and for the drive at each frequency, with limits if the shaker is known."""
     yield judged(
@@ -125,10 +139,15 @@ def dead_time(
     # the cycles' amplitudes rotate with exp(-i omega t)
     wanted = np.conj(drive / acceleration)
     s = 1j * omega
-    basis = np.column_stack((s**0, 1.0 / s, 1.0 / s**2))
+    magnitude = np.abs(wanted)
+    basis = np.column_stack((s**0, 1.0 / s, 1.0 / s**2)) / magnitude[:, None]
     tried = np.arange(-2.0 * longest, 2.0 * longest, _FINEST)
-    left = [_residual((basis.T * np.exp(s * time)).T, wanted) for time in tried]
-    return float(tried[int(np.argmin(left))])
+    # exp(s T) only rotates a row: turned back on the right side, it leaves one matrix for all T
+    turned = (wanted / magnitude)[:, None] * np.exp(-s[:, None] * tried)
+    rows, aims = np.concatenate((basis.real, basis.imag)), np.concatenate((turned.real, turned.imag))
+    solutions, *_ = np.linalg.lstsq(rows, aims, rcond=None)
+    residuals = np.sum((aims - rows @ solutions) ** 2, axis=0)
+    return float(tried[int(np.argmin(residuals))])
 
 
 def _noise(channel: Channel, counts: Counts, limit: float | None) -> CheckLine:
@@ -158,12 +177,3 @@ def _reason(channel: Channel, invalid: Counts) -> str:
     if channel.name in STOREYS:
         return f"{why}: check that the laser is on and that the storey rests in the middle of the laser's range"
     return f"{why}: check the sensor's supply, its cable, and the terminal and range of the input"
-
-
-def _residual(basis: NDArray[np.complexfloating], wanted: NDArray[np.complex128]) -> float:
-    """Sum of squared relative residuals of a least-squares fit with real coefficients."""
-    weighed = basis / np.abs(wanted)[:, None]
-    rows = np.concatenate((weighed.real, weighed.imag))
-    aim = np.concatenate(((wanted / np.abs(wanted)).real, (wanted / np.abs(wanted)).imag))
-    solution, *_ = np.linalg.lstsq(rows, aim, rcond=None)
-    return float(np.sum((aim - rows @ solution) ** 2))

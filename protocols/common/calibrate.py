@@ -140,8 +140,8 @@ def need_cycles(cycles: Sequence[Cycle], asked: int) -> None:
     if len(cycles) < ENOUGH * asked:
         raise Unmeasurable(
             f"{asked - len(cycles)} of {asked} cycles have missing samples: a sensor exceeds its range, or its "
-            "values are late; the data file states the reason for each sample. Move the sensor, reduce the motion, or "
-            "close other programs"
+            "values are late; the data file states the reason for each sample. Move the sensor, reduce the motion, "
+            "increase acquisition.lead, or close other programs"
         )
 
 

@@ -14,7 +14,8 @@ from bench.document.document import Column, Part, Picture, Section, Table
 from bench.document.typography import plain
 from bench.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, VERMILLION, new_figure, set_grid
 from bench.figures.text_table import TextColumn, text_table
-from protocols.common.decays.report import EXPANDED, Rows, budget_parts, decay_label, expanded_text, relative_parts
+from protocols.common.budgets import budget_parts, budgeted
+from protocols.common.decays.report import EXPANDED, Rows, decay_label, expanded_text
 from protocols.coupling_stiffness.protocol import SpringPoint
 from protocols.coupling_stiffness.springs import SpringResult
 
@@ -170,12 +171,12 @@ def _spring_pictures(points: Rows) -> list[Part]:
     figure = _labels_figure(*([row[name] for row in rows] for name in ("beta", "beta_mounted", "beta_uncertainty")))
     caption = "Deviation of the mounted springs from their labels, with expanded uncertainties (k = 2)."
     parts: list[Part] = [Picture(figure, caption, "Deviation of each spring from its label.")]
-    known = [row for row in rows if row.get("k_c_parts")]
-    if not known:
-        return parts
-    shares = [relative_parts(row["k_c_parts"], row["k_c_n_m"]) for row in known]
-    expanded = [100.0 * row["k_c_uncertainty"] / abs(row["k_c_n_m"]) for row in known]
-    return parts + budget_parts("k_C", [f"β = {row['beta']:g}" for row in known], shares, expanded)
+    results = [
+        result
+        for row in rows
+        for result in budgeted(f"β = {row['beta']:g}", row["k_c_n_m"], row.get("k_c_parts"), row["k_c_uncertainty"])
+    ]
+    return parts + budget_parts("k_C", results)
 
 
 def _labels_figure(labels: Sequence[float], mounted: Sequence[float], expanded: Sequence[float]) -> "Figure":

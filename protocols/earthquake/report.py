@@ -17,6 +17,7 @@ from bench.document.document import Column, Listing, Notice, Part, Picture, Sect
 from bench.document.typography import ABSENT, counted, percent, plain, typeset, with_uncertainty, yes_or_no
 from bench.figures.earthquake_figure import DriftPicture, MotionPicture, drift_figure, gain_figure, motion_figure
 from bench.live_values import RunningGain
+from protocols.common.budgets import budget_parts, budgeted
 from protocols.earthquake.campaign import check_statement
 from protocols.earthquake.measurement import STEP, History, observe
 from protocols.earthquake.protocol import EarthquakeParameters
@@ -39,6 +40,16 @@ def seismic_sections(campaign: Campaign) -> list[Section]:
         _gains(points),
         _first_storey(points),
         _conditions(points),
+        *budget_parts(
+            "the difference of measured and predicted α₂",
+            [
+                result
+                for row in points
+                for result in budgeted(
+                    f"{row['record']}, β = {row['beta']:g}", row["alpha_2"], row.get("uncertainty_parts")
+                )
+            ],
+        ),
     ]
     table = campaign.record.tables.get("prediction", {})
     if {"record", "beta", "alpha_2"} <= table.keys():

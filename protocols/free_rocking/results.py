@@ -1,7 +1,6 @@
 # pyright: reportUnknownMemberType=false
 """Results of free rocking: text table, figures, and report section."""
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import degrees, log10
@@ -16,9 +15,9 @@ from bench.analysis.gain import COVERAGE
 from bench.document.campaign import Campaign
 from bench.document.document import Column, Listing, Notice, Part, Picture, Section, Table
 from bench.document.typography import plain, typeset, with_uncertainty
-from bench.figures.budget_figure import budget_figure
 from bench.figures.style import BLACK, BLUE, GREY, MARKERS, SERIES, VERMILLION, new_figure, set_grid
 from bench.figures.text_table import TextColumn, text_table
+from protocols.common.budgets import Budgeted, budget_parts, budgeted
 from protocols.free_rocking.protocol import ALL, RockingPoint
 
 if TYPE_CHECKING:
@@ -193,7 +192,10 @@ def rocking_sections(campaign: Campaign) -> list[Section]:
     else:
         parts += [_result_text(combined), _shape_table(combined)]
     parts.append(_tilts_table([*tilts, combined] if combined else tilts))
-    parts += _budget([*tilts, combined] if combined else tilts)
+    budgets = list[Budgeted]()
+    for row in [*tilts, combined] if combined else tilts:
+        budgets += budgeted(str(row["part"]), row["r_exp"], row.get("uncertainty_parts"), row["r_exp_uncertainty"])
+    parts += budget_parts("r", budgets)
     remarks = [f"{row['part']}: {row['remarks']}" for row in campaign.points if row["remarks"]]
     if remarks:
         parts += ["Remarks:", Listing(remarks)]
@@ -266,24 +268,6 @@ def _tilts_table(rows: list[dict[str, Any]]) -> Table:
         Column("residual", "µm"),
     ]
     return Table("Tilts, positive towards the frame (measured, k = 2)", columns, cells)
-
-
-def _budget(rows: list[dict[str, Any]]) -> list[Part]:
-    """Bar chart of the uncertainty budget of r, which older files lack."""
-    known = [row for row in rows if row.get("uncertainty_parts")]
-    if not known:
-        return []
-    figure = budget_figure(
-        [str(row["part"]) for row in known],
-        [json.loads(row["uncertainty_parts"]) for row in known],
-        [100.0 * row["r_exp_uncertainty"] / row["r_exp"] for row in known],
-        "expanded uncertainty of r",
-    )
-    text = (
-        "Contributions to the uncertainty of r: each bar is the expanded uncertainty (k = 2), divided in "
-        "proportion to the contributions to the variance."
-    )
-    return [Picture(figure, text, "Horizontal bars of the expanded uncertainty, split by contribution.")]
 
 
 def _recorded_impacts(campaign: Campaign, tilts: list[dict[str, Any]]) -> list[Impacts]:

@@ -12,7 +12,8 @@ from bench.document.campaign import Campaign
 from bench.document.document import Column, Part, Picture, Section, Table
 from bench.document.typography import counted, plain, yes_or_no
 from bench.figures.style import BLUE, VERMILLION, new_figure, set_grid
-from protocols.common.decays.report import EXPANDED, Rows, budget_parts, decay_label, expanded_text, relative_parts
+from protocols.common.budgets import budget_parts, budgeted
+from protocols.common.decays.report import EXPANDED, Rows, decay_label, expanded_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -79,14 +80,17 @@ def _frame(points: list[dict[str, Any]]) -> Table:
 
 
 def _frame_budget(points: Rows) -> list[Part]:
-    """Table and bar chart of the frame's uncertainty budget, for all decays together."""
+    """Uncertainty budget of the frame, for all decays together."""
     together = [row for row in points if row["decay"] == 0 and row.get("k1_parts")]
     if not together:
         return []
     row = together[-1]
-    shares = [relative_parts(row[f"{name}_parts"], row[field]) for name, (_, field) in _SIGNS.items()]
-    expanded = [100.0 * row[f"{name}_uncertainty"] / abs(row[field]) for name, (_, field) in _SIGNS.items()]
-    return budget_parts("the frame", [sign for sign, _ in _SIGNS.values()], shares, expanded)
+    results = [
+        result
+        for name, (symbol, field) in _SIGNS.items()
+        for result in budgeted(symbol, row[field], row[f"{name}_parts"], row[f"{name}_uncertainty"])
+    ]
+    return budget_parts("the frame", results)
 
 
 def _damping(points: list[dict[str, Any]]) -> Table:

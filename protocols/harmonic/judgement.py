@@ -97,8 +97,7 @@ class _Comparison:
         return self.predicted | {
             "alpha_2": measured.alpha_2,
             "alpha_2_uncertainty": measured.uncertainty,
-            "dominating": measured.budget.dominating,
-            "uncertainty_parts": measured.budget.as_json,
+            **measured.budget.fields,
             "agrees": agrees,
             "drift_peak_m": peak.drift,
             "amplitude_m_s2": peak.amplitude,

@@ -146,6 +146,14 @@ class HarmonicPoint(Parameters):
     )
     dominating: str = quantity("", "", "largest contribution to the uncertainty of alpha_2")
     uncertainty_parts: str = quantity("", "", "standard uncertainty of alpha_2 by contribution, largest first, as JSON")
+    uncertainty_correlations: str = quantity(
+        "",
+        "",
+        "correlation between the errors of both tests by contribution, as JSON; correlated errors cancel in alpha_2",
+    )
+    degrees_of_freedom: float | None = quantity(
+        None, "1", "effective degrees of freedom of the uncertainty of alpha_2 (GUM G.4); absent above 1000"
+    )
     alpha_2_predicted: float | None = quantity(None, "1", "predicted gain at the achieved amplitude")
     alpha_2_predicted_uncertainty: float | None = quantity(
         None, "1", "expanded uncertainty of the predicted gain (k = 2), due to the specimen"

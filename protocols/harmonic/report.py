@@ -1,9 +1,8 @@
 """Report sections on steady sine tests: gains, uncertainty budgets, spectra (Fig. 6), map (Fig. 4), cycles (Fig. 5)."""
 
-import json
 from collections.abc import Mapping, Sequence
 from math import degrees
-from typing import Any, cast
+from typing import Any
 
 from bench.analysis.signals import SignalMap
 from bench.datafile.tables import arrays
@@ -11,18 +10,15 @@ from bench.document.campaign import Campaign
 from bench.document.document import Column, Listing, Notice, Part, Picture, Section, Table
 from bench.document.gain_map import map_section
 from bench.document.typography import ABSENT, counted, percent, plain, typeset, with_uncertainty, yes_or_no
-from bench.figures.budget_figure import budget_figure
 from bench.figures.map_figure import MapPoint
 from bench.figures.spectra_figure import gain_spectra
 from bench.prediction.bands import expanded_uncertainty
+from protocols.common.budgets import budget_parts, budgeted
 from protocols.harmonic.holding import HoldCycle
 from protocols.harmonic.report_cycles import Dwells, MeasuredMotion, measured_figure
 from protocols.harmonic.report_hold import hold_figure
 from sim.errors import InvalidInput
 from sim.gain import Branch, predict_gain
-
-MOST = 30
-"""Largest number of bars in a figure."""
 
 ROWS = 4
 """Maximum number of points in a figure of cycles."""
@@ -239,43 +235,18 @@ def _conditions(points: Sequence[Mapping[str, Any]]) -> Table:
 
 
 def _budget_parts(points: Sequence[Mapping[str, Any]]) -> list[Part]:
-    """Table and figure of the uncertainty budgets, which older files lack."""
-    known = [(row, found) for row in points if row["alpha_2"] and (found := _budget(row))]
-    if not known:
-        return []
-    totals = {
-        name: sum((found.get(name, 0.0) / row["alpha_2"]) ** 2 for row, found in known)
-        for _, found in known
-        for name in found
-    }
-    names = sorted(totals, key=lambda name: -totals[name])
-    labels = [f"β = {row['beta']:g}, Ω = {row['omega_rad_s']:g} rad/s" for row, _ in known]
-    expanded = [100.0 * row["alpha_2_uncertainty"] / row["alpha_2"] for row, _ in known]
-    columns = [Column("point", words=True), Column("U (k = 2)", "%"), *(Column(name, "%") for name in names)]
-    rows = [
-        [label, f"{size:.2f}", *(_share(found, name, row["alpha_2"]) for name in names)]
-        for label, size, (row, found) in zip(labels, expanded, known, strict=True)
+    results = [
+        result
+        for row in points
+        for result in budgeted(
+            f"β = {row['beta']:g}, Ω = {row['omega_rad_s']:g} rad/s",
+            row["alpha_2"],
+            row.get("uncertainty_parts"),
+            row["alpha_2_uncertainty"],
+            row.get("uncertainty_correlations"),
+        )
     ]
-    caption = (
-        "Uncertainty budget of α₂: expanded uncertainty, and standard uncertainties by contribution, largest "
-        "first; common errors cancel"
-    )
-    picture = Picture(
-        budget_figure(labels[:MOST], [found for _, found in known[:MOST]], expanded[:MOST]),
-        "Contributions to the uncertainty of α₂: each bar is the expanded uncertainty (k = 2), divided in "
-        "proportion to the contributions to the variance.",
-        "Horizontal bars of the expanded uncertainty at every point, split by contribution.",
-    )
-    return [Table(caption, columns, rows), picture]
-
-
-def _budget(row: Mapping[str, Any]) -> dict[str, float]:
-    text = row.get("uncertainty_parts")
-    return cast(dict[str, float], json.loads(text)) if text else {}
-
-
-def _share(found: Mapping[str, float], name: str, alpha: float) -> str:
-    return f"{100.0 * found[name] / alpha:.3f}" if name in found else ABSENT
+    return budget_parts("α₂", results)
 
 
 def _times(value: float | None, factor: float) -> float | None:

@@ -126,7 +126,11 @@ def plan_pulse(parameters: DecayParameters, configuration: BenchConfiguration, s
         least = _FEWEST / configuration.sample_rate
         raise InvalidInput("pulse", pulse.duration, f"at this sample rate the pulse must last at least {least:g} s")
     if parameters.drift < LEAST:
-        raise InvalidInput("drift", parameters.drift, f"the lasers do not resolve a decay below {LEAST:g} m")
+        raise InvalidInput(
+            "drift",
+            parameters.drift,
+            f"it must be at least {LEAST:g} m: the lasers do not resolve the decay of a smaller drift",
+        )
     unit = _unit_demands(pulse, configuration, specimen)
     limits = {name: SHARE * bound.limit for name, bound in bounds(configuration).items()}
     allowed = {name: limits[name] / value for name, value in unit.items() if value > 0.0}

@@ -59,5 +59,6 @@ def test_harmonics_of_the_bare_frame_size_the_error(waves: float) -> None:
 def test_equal_motions_have_equal_errors() -> None:
     found = linearity_errors([peak(BARE), peak(BARE)], SHARES, LIMIT, WHOLE)
     first, second = found.draws(np.random.default_rng(1).standard_normal((2, 100)))
-    np.testing.assert_array_equal(first, second)
+    # a matrix product may sum its rows in different orders, depending on the processor
+    np.testing.assert_allclose(first, second, rtol=4.0 * np.finfo(float).eps)
     assert np.std(first) > 0.0

@@ -15,17 +15,19 @@ from bench.datafile.reader import open_datafile
 from bench.rigs import open_rig
 from drivers.rig import Channel, Rig
 
+SHORT = ("--cycles", "4", "--rest", "1")
+
 Check = Callable[..., tuple[int, list[dict[str, Any]]]]
 
 
 @pytest.fixture
 def check(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Check:
-    """Runs a check on a configuration and returns its exit code and lines."""
+    """Runs a check, a short one unless flags are given, on a configuration and returns its exit code and lines."""
 
     def run(configuration: str = "", *flags: str) -> tuple[int, list[dict[str, Any]]]:
         file = tmp_path / "bench.toml"
         file.write_text(configuration, encoding="utf-8")
-        code = main(["check", "--config", str(file), "--out", str(tmp_path / "out"), "--json", *flags])
+        code = main(["check", "--config", str(file), "--out", str(tmp_path / "out"), "--json", *(flags or SHORT)])
         return code, json.loads(capsys.readouterr().out)["points"]
 
     return run
@@ -35,7 +37,7 @@ def failures(lines: list[dict[str, Any]]) -> list[tuple[str, str]]:
     return [(line["subject"], line["what"]) for line in lines if line["verdict"] == "failed"]
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, *(pytest.param(seed, marks=pytest.mark.soak) for seed in (2, 3, 4, 5))])
 def test_the_simulated_bench_passes_every_line(check: Check, seed: int, tmp_path: Path) -> None:
     code, lines = check("", "--seed", str(seed))
     assert failures(lines) == []
@@ -76,7 +78,7 @@ def test_what_is_wrong_fails_on_exactly_its_line(check: Check, configuration: st
 
 
 def test_a_late_laser_fails_against_both_sensors_of_the_table(check: Check) -> None:
-    code, lines = check("[simulation.bench.laser_1]\nlatency = 4\n")
+    code, lines = check("[simulation.bench.laser_1]\nlatency = 4\n", "--cycles", "8")
     assert sorted(failures(lines)) == [
         ("laser_1", "delay against table_acceleration"),
         ("laser_1", "delay against table_displacement"),

@@ -11,9 +11,9 @@ from bench.config.model import BenchConfiguration
 from bench.engine.steps import RestSamples
 from drivers.hardware.parameters import Hardware, Lasers
 from drivers.optoncdt.codec import IMPLAUSIBLE, LATE, LOST, MEANINGS
-from drivers.rig import Channel
+from drivers.rig import Alignment, Channel
 from protocols.check.comparison import Sines, allowed_delay, delay_lines, scale_lines, signed_scale, table_delay_lines
-from protocols.check.lines import dead_time, drive_lines, input_lines, resting_lines
+from protocols.check.lines import alignment_lines, dead_time, drive_lines, input_lines, resting_lines
 from protocols.check.protocol import CheckParameters
 from sim.specimen import Frame, Specimen
 
@@ -220,3 +220,15 @@ def test_a_channel_that_never_changes_fails(name: str) -> None:
 def test_a_loud_channel_fails() -> None:
     loud = np.random.default_rng(1).integers(-40, 41, 1000)
     assert failures(rest(table_displacement=loud)) == [("table_displacement", "noise at rest")]
+
+
+def test_the_alignment_is_stated_with_its_method() -> None:
+    watched = Alignment("laser_1", 0.1, 1.0, 40e-6, 3e-3, 4000, 0)
+    configuration = BenchConfiguration()
+    lines = list(alignment_lines([watched, replace(watched, sensor="laser_2", mark_uncertainty=3e-6)], configuration))
+    assert [line.subject for line in lines] == ["laser_1", "laser_1", "laser_2", "laser_2"]
+    assert lines[0].what.startswith("alignment from arrival times")
+    assert lines[0].measured == 40e-6
+    assert lines[2].what.startswith("alignment by pulses")
+    assert (lines[2].measured, lines[2].expected) == (3e-6, pytest.approx(3.5e-6))
+    assert lines[1].measured == lines[3].measured == 3e-3

@@ -106,7 +106,8 @@ def test_pulses_tell_the_frame_and_everything_is_kept(tmp_path: Path) -> None:
         assert 0.024 < together["drift_peak_m"] < 0.036
         assert together["birge"] is not None
         (section,) = vibration_sections(Campaign(out / FILE, record))
-        frame, budget, damping = (part for part in section.parts if isinstance(part, Table))
+        frame, budget, sources, damping = (part for part in section.parts if isinstance(part, Table))
+        assert "–" not in [row[1] for row in sources.rows]
         assert [row[0] for row in budget.rows] == ["k₁", "k₂", "ξ₁", "ξ₂"]
         assert len([part for part in section.parts if isinstance(part, Picture)]) == 2
         parts = json.loads(together["k1_parts"])
@@ -151,7 +152,7 @@ def test_the_spring_is_the_difference_that_it_makes(tmp_path: Path) -> None:
             assert abs(off) < 0.5 * FURTHEST * point["beta_uncertainty"]
             assert point["k2_agrees"] is True
         (section,) = springs_sections(Campaign(out / FILE, record))
-        springs_table, budget = (part for part in section.parts if isinstance(part, Table))
+        springs_table, budget, _ = (part for part in section.parts if isinstance(part, Table))
         assert [row[0] for row in springs_table.rows][::2] == ["bare frame", "0.25", "0.97"]
         assert [row[0] for row in budget.rows] == ["β = 0.25", "β = 0.97"]
         assert len([part for part in section.parts if isinstance(part, Picture)]) == 2

@@ -69,7 +69,7 @@ def test_sections_are_those_that_the_file_has_and_one_line_says_what_it_lacks(do
 
 def test_the_results_are_those_of_the_summary_with_their_uncertainties(document: Document, file: Path) -> None:
     (point,) = json.loads((file.parent / "summary.json").read_text(encoding="utf-8"))["points"]
-    gains, conditions, budget = tables(document, "results")
+    gains, conditions, budget, sources = tables(document, "results")
     row = dict(zip([column.title for column in gains.columns], gains.rows[0], strict=True))
     value, uncertainty = (float(part) for part in row["α₂ measured"].split(" ± "))
     assert value == pytest.approx(point["alpha_2"], abs=0.001)
@@ -84,6 +84,15 @@ def test_the_results_are_those_of_the_summary_with_their_uncertainties(document:
     shown = [float(cell) for cell in budget.rows[0][1:]]
     assert shown[0] == pytest.approx(2.0 * np.hypot.reduce(shown[1:]), abs=0.006)
     assert shown[1:] == pytest.approx([100.0 * value / point["alpha_2"] for value in parts.values()], abs=6e-4)
+    # each contribution with its type and remedy; those of the lasers with the correlation of their errors in both tests
+    assert [row[0] for row in sources.rows] == list(parts)
+    assert {row[1] for row in sources.rows} == {"A", "B"}
+    correlations = json.loads(point["uncertainty_correlations"])
+    assert {row[0]: row[4] for row in sources.rows if row[4] != "–"} == {
+        name: f"{value:.2f}" for name, value in correlations.items()
+    }
+    (improvement,) = (part for part in section(document, "results").parts if "largest contribution" in str(part))
+    assert point["dominating"] in str(improvement)
 
 
 def test_the_drawn_cycles_are_the_measured_ones_in_the_phase_of_the_model(file: Path) -> None:
