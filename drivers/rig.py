@@ -8,6 +8,7 @@ block is read.
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
+from math import inf, isinf
 from typing import Protocol
 
 import numpy as np
@@ -75,6 +76,13 @@ class Alignment:
         "1", "number of values farther from their predecessors than the target can move", default=0
     )
 
+    mark_uncertainty: float = column(
+        "s",
+        "standard uncertainty of the alignment by pulses at the beginning of the run; infinite if the clocks were "
+        "aligned from arrival times alone",
+        default=inf,
+    )
+
     def __str__(self) -> str:
         rate, residual = 1e6 * (self.rate - 1.0), 1e6 * self.residual
         counted = (
@@ -83,7 +91,8 @@ class Alignment:
             if number
         )
         given = ", ".join((f"{self.values} values, {self.lost} lost", *counted))
-        return f"{self.sensor}: clock {rate:+.1f} ppm, readings within {residual:.0f} us, {given}"
+        marked = "" if isinf(self.mark_uncertainty) else f", pulses within {1e6 * self.mark_uncertainty:.0f} us"
+        return f"{self.sensor}: clock {rate:+.1f} ppm, readings within {residual:.0f} us{marked}, {given}"
 
 
 class OperatorTask(StrEnum):

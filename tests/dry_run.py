@@ -1,9 +1,10 @@
 """Hardware in the loop, without hardware: a harmonic point on the real drivers against the emulated laboratory.
 
-    python -m tests.dry_run [--omega 16 --beta 0.4 ...]
+    python -m tests.dry_run [--sockets] [--omega 16 --beta 0.4 ...]
 
-Without arguments the short form for continuous integration, under two minutes in real time; with arguments, those of
-`rockbench run harmonic`. Real nidaqmx over gRPC, real pyserial, the virtual bench moving in real time behind them.
+With `--sockets` the lasers are on network ports, as on Windows. Without other arguments the short form for continuous
+integration, under two minutes in real time; with arguments, those of `rockbench run harmonic`. Real nidaqmx over gRPC,
+real pyserial, the virtual bench moving in real time behind them.
 """
 
 import json
@@ -36,7 +37,9 @@ def hurried(configuration: BenchConfiguration) -> BenchConfiguration:
 
 def main(arguments: list[str]) -> int:
     """Run, print the points, and return 0 when every stable one agrees with its prediction."""
-    with emulated() as configuration, tempfile.TemporaryDirectory() as folder:
+    lasers = ("--lasers", "socket") if arguments[:1] == ["--sockets"] else ()
+    arguments = arguments[1:] if lasers else arguments
+    with emulated(*lasers, shown=True) as configuration, tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "bench.toml"
         file.write_text(as_toml(configuration if arguments else hurried(configuration)), encoding="utf-8")
         command = [sys.executable, "-m", "bench", "run", "harmonic", "--config", str(file), "--yes", "--json"]

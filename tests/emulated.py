@@ -17,12 +17,13 @@ _PATIENCE = 60.0
 
 
 @contextmanager
-def emulated(*arguments: str) -> Iterator[BenchConfiguration]:
-    """`rockbench emulate` with these arguments, and the configuration that it hands out."""
+def emulated(*arguments: str, shown: bool = False) -> Iterator[BenchConfiguration]:
+    """`rockbench emulate` with these arguments, and the configuration that it hands out; `shown` passes on its notes,
+    among them that of its own lateness."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "emulated.toml"
         command = [sys.executable, "-m", "bench", "emulate", "--write", str(file), "--lead", "0.4", *arguments]
-        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=None if shown else subprocess.DEVNULL)
         try:
             deadline = time.monotonic() + _PATIENCE
             while not file.exists() or not file.stat().st_size:

@@ -62,7 +62,9 @@ def _content(name: str, path: str | None) -> bytes | None:
     try:
         content = Path(path).read_bytes()
     except OSError as error:
-        raise InvalidInput(item, path, f"the file cannot be read: {error.strerror}") from None
+        raise InvalidInput(
+            item, path, f"the file cannot be read ({error.strerror}); check its path and permissions"
+        ) from None
     if b"-----BEGIN " not in content:
         raise InvalidInput(item, path, "the file is not a PEM file: convert it with `openssl x509` or `openssl pkey`")
     return content
@@ -127,7 +129,7 @@ class Connection:
         # a PC with a local driver does not need gRPC, which takes half a second to import
         import grpc
 
-        from drivers.daqmx.deadline import Deadline
+        from drivers.daqmx.deadline import Deadline, ReusedCalls
 
         gone = round(1000.0 * max(1.0, patience / 2.0))
         channel_options: list[tuple[str, int | str]] = [
@@ -172,4 +174,4 @@ class Connection:
             self._channel.close()
             raise
         self._deadline = Deadline(patience)
-        self._calls = library.intercept_channel(self._channel, self._deadline)
+        self._calls = ReusedCalls(library.intercept_channel(self._channel, self._deadline))

@@ -1,4 +1,4 @@
-"""Time-outs of calls to a gRPC device server."""
+"""Calls to a gRPC device server: their time-outs, and their reuse by all tasks."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -54,3 +54,22 @@ class Deadline(grpc.UnaryUnaryClientInterceptor):
     def _seconds(self, method: str, own: float) -> float:
         patience = self._patience * (_LATE if self.late else 1.0)
         return max(own, 0.0) + _SLOW.get(method, 0.0) + max(patience, _LEAST)
+
+
+class ReusedCalls:
+    """A channel that creates the object that calls a procedure of the server once: nidaqmx requests those of all 450
+    procedures for every task.
+    """
+
+    def __init__(self, channel: Any) -> None:
+        self._channel = channel
+        self._calls: dict[str, Any] = {}
+
+    def unary_unary(self, method: str, *arguments: Any, **options: Any) -> Any:
+        """The object that calls `method`, for gRPC's arguments and options."""
+        if method not in self._calls:
+            self._calls[method] = self._channel.unary_unary(method, *arguments, **options)
+        return self._calls[method]
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._channel, name)

@@ -66,6 +66,8 @@ class Device(Named, Protocol):
     @property
     def ao_physical_chans(self) -> Sequence[Named]: ...
     @property
+    def co_physical_chans(self) -> Sequence[Named]: ...
+    @property
     def di_lines(self) -> Sequence[Named]: ...
     @property
     def do_lines(self) -> Sequence[Named]: ...
@@ -157,6 +159,14 @@ class InputLineChannels(Protocol):
     def add_di_chan(self, lines: str) -> object: ...
 
 
+class CounterChannels(Protocol):
+    """The counter outputs of a task, low at rest; each pulse is high, then low [s]."""
+
+    def add_co_pulse_chan_time(
+        self, counter: str, *, initial_delay: float, low_time: float, high_time: float
+    ) -> object: ...
+
+
 class Timing(Protocol):
     """The sample clock of a task; `samp_timing_engine` is the number of the engine that generates it."""
 
@@ -172,6 +182,7 @@ class Timing(Protocol):
     def cfg_samp_clk_timing(
         self, rate: float, source: str = "", *, sample_mode: AcquisitionType, samps_per_chan: int
     ) -> None: ...
+    def cfg_implicit_timing(self, *, sample_mode: AcquisitionType, samps_per_chan: int) -> None: ...
 
 
 class StartTrigger(Protocol):
@@ -211,6 +222,8 @@ class Task(Named, Protocol):
     def ai_channels(self) -> InputChannels: ...
     @property
     def ao_channels(self) -> OutputChannels: ...
+    @property
+    def co_channels(self) -> CounterChannels: ...
     @property
     def di_channels(self) -> InputLineChannels: ...
     @property

@@ -7,6 +7,8 @@ from pydantic import model_validator
 from sim.errors import InvalidInput
 from sim.parameters import Parameters, quantity
 
+AUTOMATIC = "automatic"
+"""Value of a terminal that the program chooses."""
 Wiring = Literal["default", "differential", "pseudodifferential", "RSE", "NRSE"]
 
 
@@ -140,6 +142,14 @@ class Daq(Parameters):
         le=30,
         usual=(0.2, 5.0),
         example=1.0,
+    )
+    laser_marker: str | None = quantity(
+        None,
+        "",
+        "counter output that switches both serial lasers off for 40 short pulses at the beginning of each run, which "
+        "aligns their clocks; automatic: the first counter of the output's device, if the lasers follow it; if absent, "
+        "they are aligned from the arrival times of their values",
+        example="Dev1/ctr0",
     )
     emergency_stop: EmergencyStop | None = quantity(None, "", "emergency stop; absent if not wired")
     over_travel: OverTravel | None = quantity(None, "", "over-travel switches; absent if not wired")

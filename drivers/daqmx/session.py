@@ -21,6 +21,7 @@ from drivers.daqmx.safety import EnableLine, reset_chassis
 from drivers.daqmx.stale import clear_stale
 from drivers.daqmx.tasks import Tasks, chassis_of, description_of
 from drivers.errors import ConnectionLost, RigError
+from drivers.timebase.marking import Pulses
 from sim.errors import InvalidInput
 
 
@@ -40,14 +41,17 @@ class DaqSession:
     the output; `hardware.daq.clock` must then name another terminal, or OnboardClock for a separate output clock, which
     starts with the inputs and stays synchronous if both clocks have the same timebase. There is no automatic fallback.
 
-    A run is `prepare`, `write` the first samples, `start`, then `write` and `read` in turn, and `stop`. On any failure
-    in between, the relay is opened and the output set to zero before the error is raised. One thread at a time may use
-    it; `cut`, `stop` and `close` may be called from any other. The constructor brings the bench into a safe state
-    before it checks anything. Raises InvalidInput for unsupported settings and for a sample rate that the device cannot
-    produce exactly; DeviceNotFound when driver, server or device are missing or held by another program.
+    `pulses` are emitted at `daq.laser_marker` from the start of each run on. A run is `prepare`, `write` the first
+    samples, `start`, then `write` and `read` in turn, and `stop`. On any failure in between, the relay is opened and
+    the output set to zero before the error is raised. One thread at a time may use it; `cut`, `stop` and `close` may be
+    called from any other. The constructor brings the bench into a safe state before it checks anything. Raises
+    InvalidInput for unsupported settings and for a sample rate that the device cannot produce exactly; DeviceNotFound
+    when driver, server or device are missing or held by another program.
     """
 
-    def __init__(self, daq: Daq, inputs: Sequence[AnalogInput], sample_rate: float, lead: int) -> None:
+    def __init__(
+        self, daq: Daq, inputs: Sequence[AnalogInput], sample_rate: float, lead: int, pulses: Pulses | None = None
+    ) -> None:
         self._lock = threading.RLock()
         self._state = _State.IDLE
         self._at_rest = True
@@ -63,7 +67,7 @@ class DaqSession:
                 system = library.system(self._connection.options())
                 used = checked_devices(system, daq, inputs, sample_rate, lead)
                 version = system.driver_version
-            self._tasks = Tasks(self._connection, daq, inputs, sample_rate, lead, used)
+            self._tasks = Tasks(self._connection, daq, inputs, sample_rate, lead, used, pulses)
         except BaseException:
             self._connection.close()
             raise
@@ -89,6 +93,11 @@ class DaqSession:
     def delays(self) -> tuple[InputDelay, ...]:
         """Delay of each input, which `read` does not remove."""
         return self._tasks.inputs.delays
+
+    @property
+    def marker(self) -> str | None:
+        """The counter that emits the pulses; None without pulses or counter."""
+        return None if self._tasks.marker is None else self._tasks.marker.counter
 
     @property
     def dtype(self) -> type[np.int16] | type[np.int32]:
@@ -140,6 +149,8 @@ class DaqSession:
                 self._reset_watchdog()
                 self._beat()
                 self._tasks.output.arm()
+                if self._tasks.marker is not None:
+                    self._tasks.marker.arm()
                 self._tasks.inputs.start()
                 self._state = _State.RUNNING
 

@@ -13,6 +13,7 @@ from drivers.daqmx.delays import Connected
 from drivers.daqmx.devices import FoundDevice
 from drivers.daqmx.inputs import Inputs
 from drivers.daqmx.library import Version
+from drivers.daqmx.marker import Marker
 from drivers.daqmx.output import Output
 from drivers.daqmx.parameters import AnalogInput, Daq, device_name
 from drivers.daqmx.safety import (
@@ -22,6 +23,7 @@ from drivers.daqmx.safety import (
     Watchdog,
 )
 from drivers.errors import RigError, SafetyInputOpen
+from drivers.timebase.marking import Pulses
 from sim.errors import InvalidInput
 
 _LOOK = 0.05
@@ -31,7 +33,7 @@ _SAME_RATE = 1.0e-9
 
 
 class Tasks:
-    """Enable relay, watchdog, heartbeat, safety inputs, output and inputs, on the devices `used`.
+    """Enable relay, watchdog, heartbeat, safety inputs, output, inputs and marker, on the devices `used`.
 
     If one of the tasks cannot be created, the others are cleared. After construction the relay is open and the output
     at 0 V. `was_reset`: the device had to be reset to set the output to 0 V, so its tasks are gone. Raises InvalidInput
@@ -46,6 +48,7 @@ class Tasks:
         sample_rate: float,
         lead: int,
         used: Sequence[FoundDevice],
+        pulses: Pulses | None = None,
     ) -> None:
         self.relay: EnableLine | None = None
         self.watchdog: Watchdog | None = None
@@ -74,6 +77,7 @@ class Tasks:
             made.callback(_quietly, self.output.clear)
             _require_rate("inputs", self.inputs.rate, sample_rate)
             _require_rate("output", self.output.rate, sample_rate)
+            self.marker = None if pulses is None else Marker(connection, daq, pulses)
             self._made = made.pop_all()
 
     def prepare(self, is_cut: Callable[[], bool]) -> None:
@@ -89,6 +93,8 @@ class Tasks:
         if self.safety is not None:
             self.safety.stop()
         self.output.prepare(self.inputs.trigger)
+        if self.marker is not None:
+            self.marker.prepare(self.inputs.trigger)
         # nothing on the device may be reserved when its watchdog starts; the first samples reserve the output
         if self.watchdog is not None:
             self.watchdog.start()
@@ -137,6 +143,8 @@ class Tasks:
             self.was_reset = True
             failures.append(RigError("the output was still reserved: the device was reset; open a new session"))
         attempt(self.inputs.stop)
+        if self.marker is not None:
+            attempt(self.marker.clear)
         # a watchdog is stopped only after everything else: without resets it opens the relay, and once expired it keeps
         # the relay open
         if self.watchdog is not None and not failures:

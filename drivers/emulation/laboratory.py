@@ -5,6 +5,9 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import Any, Self
 
+import numpy as np
+from numpy.typing import NDArray
+
 from drivers.emulation.bench import EmulatedBench
 from drivers.emulation.control import ControlServer
 from drivers.emulation.daqmx.lines import Wires
@@ -15,6 +18,9 @@ from drivers.emulation.wiring import HEARTBEAT, Connection, Device, hardware_of,
 from drivers.rig import OperatorTask
 from sim.specimen import Specimen
 from sim.virtual_bench import VirtualBenchParameters
+
+LATE = 0.05
+"""Delay of the emulated lasers [s] beyond which samples of a client with the default lead are late."""
 
 
 @dataclass(frozen=True)
@@ -54,13 +60,18 @@ class Laboratory:
             opened.callback(bench.close)
             self.bench = bench
             self.lasers: tuple[EmulatedLaser, ...] = ()
-            if connection == "serial":
+            if connection != "analogue":
                 for storey, laser, error in (
                     (1, parameters.laser_1, errors.laser_1),
                     (2, parameters.laser_2, errors.laser_2),
                 ):
                     one = EmulatedLaser(
-                        bench.sight(storey), laser, serial=f"1503000{storey}", clock_error=error, seed=seed + storey
+                        bench.sight(storey),
+                        laser,
+                        serial=f"1503000{storey}",
+                        clock_error=error,
+                        seed=seed + storey,
+                        network=connection == "socket",
                     )
                     opened.callback(one.close)
                     bench.connect_laser(storey, lambda one=one: one.analogue)
@@ -69,6 +80,7 @@ class Laboratory:
             wires = Wires(
                 {site.enable: self.safety.enable_line, site.heartbeat: self.safety.heartbeat_line},
                 {line: self.safety.inputs[name] for name, line in zip(INPUTS, site.contacts, strict=False)},
+                {} if site.counter is None else {site.counter: self._switch_lasers},
             )
             self.daq = DaqServer(bench, site.devices, converter=parameters.converter, drive=site.output, wires=wires)
             opened.callback(self.daq.close)
@@ -91,6 +103,11 @@ class Laboratory:
         for laser in self.lasers:
             laser.start()
         self.daq.start()
+
+    def late(self) -> dict[str, float]:
+        """The lasers whose values this computer has sent late since the last call, with the longest delay [s]."""
+        found = {f"laser {storey}": laser.take_lateness() for storey, laser in enumerate(self.lasers, 1)}
+        return {name: delay for name, delay in found.items() if delay > LATE}
 
     def close(self) -> None:
         """Switch everything off and end all threads and processes; may be called repeatedly."""
@@ -116,6 +133,11 @@ class Laboratory:
     def _perform(self, arguments: Mapping[str, Any]) -> None:
         self.bench.perform(OperatorTask(arguments["work"]), arguments.get("amount"))
 
+    def _switch_lasers(self, edges: NDArray[np.float64]) -> None:
+        """The counter is wired to the inputs that switch the lasers on: high is open."""
+        for laser in self.lasers:
+            laser.switch(edges)
+
     def _laser(self, arguments: Mapping[str, Any]) -> None:
         """Inject a fault of the laser on `storey` by a method of EmulatedLaser, given by name, with its `arguments`."""
         laser = self.lasers[int(arguments["storey"]) - 1]
@@ -139,7 +161,9 @@ class Laboratory:
             "drive": self.daq.volts(self.hardware.daq.output),
             "first_sample": self.daq.first_sample,
             "sample_rate": self.bench.rate_true,
-            "lasers": [{"epoch": laser.epoch, "rate": laser.rate_true} for laser in self.lasers],
+            "lasers": [
+                {"epoch": laser.epoch, "rate": laser.rate_true, "stamp_lag": laser.stamp_lag} for laser in self.lasers
+            ],
         }
 
 

@@ -13,7 +13,8 @@ from sim.errors import InvalidInput
 from sim.parameters import Parameters
 from sim.virtual_bench import VirtualBenchParameters
 
-Connection = Literal["serial", "analogue"]
+Connection = Literal["serial", "socket", "analogue"]
+"""Connection of the lasers; `socket` is the serial line on a network port."""
 Device = Literal["usb", "crio", "cDAQ-9174", "cDAQ-9185", "cRIO-9045", "cRIO-9049", "PCIe-6351", "USB-6351"]
 """Selectable devices: two sets with a calibration polynomial, USB-6363 and cRIO-9045 with NI 9239, and `zoo`'s."""
 
@@ -35,8 +36,8 @@ class Site:
     """Devices of a laboratory and the terminals in use.
 
     `inputs` are the terminals of displacement, acceleration and lasers; `contacts` are the digital inputs in the order
-    of the safety chain's INPUTS, none on a device without digital inputs. `range` is the largest voltage of all inputs
-    [V].
+    of the safety chain's INPUTS, none on a device without digital inputs. `counter` switches the lasers; None if there
+    is none. `range` is the largest voltage of all inputs [V].
     """
 
     devices: tuple[DeviceModel, ...]
@@ -45,6 +46,7 @@ class Site:
     enable: str
     heartbeat: str
     contacts: tuple[str, ...]
+    counter: str | None
     has_watchdog: bool
     range: float
 
@@ -82,6 +84,7 @@ def site_of(device: Device, modules: Sequence[str] = ()) -> Site:
         enable=relays.line_names[0],
         heartbeat=heartbeat,
         contacts=contacts,
+        counter=next((name for one in devices for name in one.counter_names), None),
         has_watchdog=any(one.watchdog is not None for one in devices),
         range=min(ranges),
     )
@@ -148,7 +151,7 @@ def hardware_of(
     span = min(p.converter.range, site.range)
     # delay from the data sheets of filter and laser; the loop check measures the remainder
     latency = _PIPELINE / p.laser_1.rate + 30.0 * _VALUES / _BAUD
-    delay = p.filter_unit.delay(p.sample_rate) - latency if connection == "serial" else 0.0
+    delay = p.filter_unit.delay(p.sample_rate) - latency if connection != "analogue" else 0.0
     return Hardware(
         sample_rate=p.sample_rate,
         half_stroke=p.shaker.half_stroke,
@@ -172,7 +175,7 @@ def hardware_of(
             terminal=acceleration, range=span, sensitivity=1.0 / p.accelerometer.nominal[0]
         ),
         lasers=Lasers(
-            connection=connection,
+            connection="analogue" if connection == "analogue" else "serial",
             reference=p.laser_1.reference,
             rate=p.laser_1.rate,
             delay=round(delay, 6),

@@ -97,7 +97,11 @@ class LaserInput(AnalogInput):
     """A laser on a storey; terminal, wiring and range are for its analogue output."""
 
     port: str | None = quantity(
-        None, "", "serial port, such as COM5 or /dev/ttyUSB0; required for the serial connection", example="COM5"
+        None,
+        "",
+        "serial port, such as COM5 or /dev/ttyUSB0, or socket://HOST:PORT of a serial device server; required for the "
+        "serial connection",
+        example="COM5",
     )
     serial_number: str | None = quantity(
         None,
@@ -127,7 +131,11 @@ class Laser2(LaserInput):
 
     terminal: str = quantity("Dev1/ai3", "", "physical channel of the input")
     port: str | None = quantity(
-        None, "", "serial port, such as COM6 or /dev/ttyUSB1; required for the serial connection", example="COM6"
+        None,
+        "",
+        "serial port, such as COM6 or /dev/ttyUSB1, or socket://HOST:PORT of a serial device server; required for the "
+        "serial connection",
+        example="COM6",
     )
 
 

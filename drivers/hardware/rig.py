@@ -3,6 +3,7 @@
 from collections.abc import Generator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
+from math import ceil
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,7 @@ from drivers.clock import WallClock, now
 from drivers.daqmx.clock_watch import ClockWatch
 from drivers.daqmx.delays import InputDelay
 from drivers.daqmx.inputs import NAME as INPUT_TASK
+from drivers.daqmx.parameters import AUTOMATIC
 from drivers.daqmx.session import DaqSession
 from drivers.drive import REARM, RigBase, RigState, require_block
 from drivers.emulation.control import ask, place_of
@@ -22,7 +24,12 @@ from drivers.hardware.parameters import Hardware
 from drivers.hardware.tracks import Tracks, open_serial_lasers
 from drivers.rig import Alignment, Block, Channel, Counts, OperatorTask, RawValues
 from drivers.timebase.deskew import Deskew
+from drivers.timebase.marking import Pulses, golden_pulses
 
+_SETTLING = 0.05
+"""Time between the last pulse and the first sample of a run [s]."""
+_CHUNK = 0.1
+"""Duration of a read during the pulses [s], short against the time-outs of watchdog and heartbeat relay."""
 _FIRST_READINGS = 20
 """Number of readings of the sample clock after its start, which bound it to within a fraction of a call's duration."""
 
@@ -49,7 +56,11 @@ class HardwareRig(RigBase):
             self._ownership = opened.enter_context(ExitStack())
             self._ownership.enter_context(owned(devices_of(hardware)))
             # the DAQ comes first: opening it brings the bench into a safe state after any earlier program
-            self._daq = DaqSession(hardware.daq, inputs, hardware.sample_rate, lead)
+            marked = bool(hardware.serial_lasers) and hardware.daq.laser_marker is not None
+            pulses = golden_pulses(hardware.lasers.rate) if marked else None
+            self._daq = DaqSession(hardware.daq, inputs, hardware.sample_rate, lead, pulses)
+            self._pulses = pulses if self._daq.marker is not None else None
+            self._must_follow = hardware.daq.laser_marker != AUTOMATIC
             opened.callback(self._daq.close)
             scaled = analogue_channels(hardware, self._daq.scalings, self._daq.description, further)
             analogue = tuple(map(_with_delay, scaled, self._daq.delays))
@@ -82,10 +93,15 @@ class HardwareRig(RigBase):
         }
         self._failed = False
         self._phase = 0.0
+        self.skipped = 0 if self._pulses is None else ceil((self._pulses.end + _SETTLING) * self.sample_rate)
+        """Samples acquired before the first one of each run, for the alignment of the lasers."""
 
     @property
     def alignments(self) -> tuple[Alignment, ...]:
-        return self._tracks.alignments if self._tracks is not None else ()
+        if self._tracks is None:
+            return ()
+        skipped = self.skipped / self.sample_rate
+        return tuple(replace(one, offset=one.offset - skipped) for one in self._tracks.alignments)
 
     def raw_values(self) -> tuple[RawValues, ...]:
         return self._tracks.raw() if self._tracks is not None else ()
@@ -100,6 +116,8 @@ class HardwareRig(RigBase):
             self._tracks.begin(self.sample_rate, self.clock)
         with self._ending_on_failure():
             self._daq.prepare()
+            if self.skipped:
+                self._daq.write(np.zeros(self.skipped))
         self._drive.begin()
         self._deskew.begin()
         self._failed = False
@@ -156,6 +174,20 @@ class HardwareRig(RigBase):
         self._state = RigState.RUNNING
         if self._tracks is not None:
             self._observe_clock(self._tracks, _FIRST_READINGS)
+            if self._pulses is not None:
+                self._mark(self._tracks, self._pulses)
+
+    def _mark(self, tracks: Tracks, pulses: Pulses) -> None:
+        """Align the lasers by pulses before the first sample of the run; the drive is zero."""
+        for chunk in np.array_split(np.arange(self.skipped), ceil(self.skipped / (_CHUNK * self.sample_rate))):
+            self._daq.read(chunk.size)
+            self._observe_clock(tracks, _READINGS)
+        others = tracks.mark(pulses, self.lead)
+        if others and self._must_follow:
+            raise RigError(
+                f"{' and '.join(others)} did not follow the pulses of hardware.daq.laser_marker; check the wire from "
+                "the counter to the input that switches the laser on, or omit this key"
+            )
 
     def _observe_clock(self, tracks: Tracks, times: int) -> None:
         """Read the sample clock between two readings of the machine's clock, which bound it. A separate process
@@ -184,7 +216,7 @@ class HardwareRig(RigBase):
         if self._tracks is None:
             return counts
         self._observe_clock(self._tracks, _READINGS)
-        return np.column_stack((counts, self._tracks.counts(self._drive.index, n)))
+        return np.column_stack((counts, self._tracks.counts(self.skipped + self._drive.index, n, self.lead)))
 
     @contextmanager
     def _ending_on_failure(self) -> Generator[None]:

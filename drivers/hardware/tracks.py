@@ -16,14 +16,19 @@ from drivers.optoncdt.codec import IMPLAUSIBLE, LATE, LOST, MEANINGS, MID_RANGE,
 from drivers.optoncdt.sensor import SerialLaser
 from drivers.rig import Alignment, Channel, RawValues
 from drivers.timebase.clocks import SampleClock
+from drivers.timebase.marking import Pulses
 from drivers.timebase.resampling import Marks
 from drivers.timebase.sensor_track import SensorTrack
 from sim.errors import InvalidInput
 
-_PATIENCE = 0.05
-"""Longest wait for late values of a block [s]; values that arrive later are marked as late."""
-_SHARE = 0.5
-"""Longest wait as a fraction of the block's duration, so that the drive is written in time."""
+_SHARE, _RESERVE = 0.5, 0.1
+"""Part of the drive still queued during which a block waits for late values: all but 0.1 s, and at least half. The rest
+is the time for the next write.
+"""
+_LONGEST, _LEAST = 0.4, 0.05
+"""Delay of a block [s] up to which it waits, shorter than the default of `limits.late`, and the longest wait of a block
+that is already later, for values received during a stall of the program.
+"""
 
 
 _FASTEST = 5.0
@@ -132,22 +137,26 @@ class Tracks:
         """
         self._running.observe(before, count, after)
 
-    def counts(self, first: int, n: int) -> NDArray[np.int16]:
-        """Counts at `n` samples from `first` on, shape (n, n_tracks); waits briefly for late values.
+    def counts(self, first: int, n: int, lead: int) -> NDArray[np.int16]:
+        """Counts at `n` samples from `first` on, shape (n, n_tracks); waits for late values.
 
-        Values that have not arrived by then are marked as late; a silent sensor is not awaited. Raises ConnectionLost,
-        and RigError before a run.
+        `lead` is the number of drive samples queued beyond the block. The wait ends in time for the next write,
+        whatever the block has waited for before. Values that have not arrived by then are marked as late; a silent
+        sensor is not awaited. Raises ConnectionLost, and RigError before a run.
         """
         last = (first + n - 1) / self._sample_rate
-        deadline = now() + min(_PATIENCE, _SHARE * n / self._sample_rate)
-        self._take()
-        for track in self._tracks:
-            sensor = track.sensor
-            while track.placing.reach(self._running) < last and not sensor.silent and (left := deadline - now()) > 0.0:
-                sensor.wait(left)
-                self._take()
+        self._await(last, now() + longest_wait(lead / self._sample_rate, self._since(last)))
         placed = [track.placing.counts(self._running, first, n, self._sample_rate) for track in self._tracks]
         return np.column_stack(placed)
+
+    def mark(self, pulses: Pulses, lead: int) -> tuple[str, ...]:
+        """Align the sensors by pulses that have switched them off; the names of those that have not followed.
+
+        Waits for late values as `counts` does.
+        """
+        deadline = now() + longest_wait(lead / self._sample_rate, self._since(pulses.end))
+        self._await(pulses.end, deadline)
+        return tuple(track.channel.name for track in self._tracks if not track.placing.mark(self._running, pulses))
 
     def raw(self) -> tuple[RawValues, ...]:
         """The values received since the last call, or since the run began, before resampling."""
@@ -171,6 +180,22 @@ class Tracks:
         """Stop the streams and release the devices; may be called repeatedly."""
         self._opened.close()
 
+    def _await(self, seconds: float, deadline: float) -> None:
+        """Wait for values up to a time of the sample clock [s], until `deadline` of the machine's clock."""
+        self._take()
+        for track in self._tracks:
+            sensor = track.sensor
+            while (
+                track.placing.reach(self._running) < seconds and not sensor.silent and (left := deadline - now()) > 0.0
+            ):
+                sensor.wait(left)
+                self._take()
+
+    def _since(self, seconds: float) -> float:
+        """Time since a sample [s], given on the sample clock; 0 before the first reading of that clock."""
+        passed = float(self._running.seconds(np.array([now()]))[0]) - seconds
+        return passed if passed > 0.0 else 0.0
+
     @property
     def _running(self) -> SampleClock:
         if self._clock is None:
@@ -191,6 +216,14 @@ class Tracks:
             if readings.index.size:
                 raw.append(readings)
             track.placing.add(readings.index, readings.time, readings.code, readings.arrival)
+
+
+def longest_wait(lead: float, passed: float) -> float:
+    """Longest wait for late values of a block [s] whose last sample was `passed` [s] ago, with a drive queued for
+    `lead` [s] from then on.
+    """
+    left = max(lead - passed, 0.0)
+    return min(max(_SHARE * left, left - _RESERVE), max(_LONGEST - passed, _LEAST))
 
 
 def open_serial_lasers(hardware: Hardware) -> tuple[Track, ...]:

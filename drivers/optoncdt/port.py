@@ -1,11 +1,14 @@
-"""Serial ports of this machine."""
+"""Serial ports of this machine, and of serial device servers at `socket://HOST:PORT`."""
 
 import errno
+import socket
 import sys
 from contextlib import suppress
+from typing import Any, cast
 
 from serial import Serial, SerialException
 from serial.tools import list_ports
+from serial.urlhandler import protocol_socket
 
 from drivers.errors import DeviceNotFound
 
@@ -20,6 +23,25 @@ else:
 _READ_TIMEOUT = 0.02
 _WRITE_TIMEOUT = 1.0
 _WINDOWS_BUFFER = 1 << 18
+_NETWORK_BUFFER = 1 << 16
+
+
+NETWORK = "socket://"
+"""Beginning of the address of a serial line on a network port."""
+
+
+class SocketPort(protocol_socket.Serial):
+    """A serial line on a network port, with the number of received bytes; the library states only whether there are
+    any, so that a stream would be read byte by byte.
+    """
+
+    @property
+    def in_waiting(self) -> int:
+        """Number of received bytes; 1 at the end of the connection, so that reading raises SerialException."""
+        try:
+            return len(cast(Any, self)._socket.recv(_NETWORK_BUFFER, socket.MSG_PEEK)) or 1
+        except BlockingIOError:
+            return 0
 
 
 def listed_ports() -> list[str]:
@@ -30,8 +52,15 @@ def listed_ports() -> list[str]:
 def open_port(name: str, port: str, baud: int) -> Serial:
     """Open `port` for `name` with exclusive access, 8 data bits, no parity, one stop bit (manual, p. 84).
 
-    Raises DeviceNotFound if the port is absent, held by another program, not permitted or not a serial port.
+    The baud rate and exclusive access do not apply to a network port. Raises DeviceNotFound if the port is absent, held
+    by another program, not permitted or not a serial port.
     """
+    if port.startswith(NETWORK):
+        try:
+            return cast(Serial, SocketPort(port, baud, timeout=_READ_TIMEOUT, write_timeout=_WRITE_TIMEOUT))
+        except _PORT_ERRORS as error:
+            told = "check the address, and that the device server is switched on and has no other client"
+            raise DeviceNotFound(f"{name} cannot be opened: {port} does not respond ({error}); {told}") from error
     try:
         opened = Serial(port, baud, timeout=_READ_TIMEOUT, write_timeout=_WRITE_TIMEOUT, exclusive=True)
     except _PORT_ERRORS as error:

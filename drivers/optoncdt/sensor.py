@@ -109,8 +109,10 @@ def _set_rate(dialogue: Dialogue, rate: float) -> bool:
 
 _LOCK_TIME = 2.0
 """Longest wait for the first accepted value after the stream is switched on [s]."""
-_SILENT_PERIODS, _SILENT_TIME = 10.0, 0.1
-"""Number of periods and time [s] without data after which a sensor is silent."""
+_SILENT_PERIODS, _SILENT_TIME = 10.0, 0.4
+"""Number of periods and time [s] without data after which a sensor is silent. The system may pass on received bytes by
+a thread of normal priority, which busy processors delay by tenths of a second.
+"""
 _QUIET, _DRAINED = 0.05, 0.5
 _COUNTING, _COUNTED = 0.5, 0.2
 """Duration [s] of counting values, and largest relative deviation from the set rate; rates differ by a factor of
@@ -166,7 +168,7 @@ class SerialLaser:
 
     @property
     def silent(self) -> bool:
-        """True if no measurement has arrived for 10 periods and 0.1 s, and also before `start` and after `stop`."""
+        """True if no measurement has arrived for 10 periods and 0.4 s, and also before `start` and after `stop`."""
         if self._stream is None or not self._streaming:
             return True
         return now() - self._stream.last_arrival > max(_SILENT_PERIODS / self._rate, _SILENT_TIME)

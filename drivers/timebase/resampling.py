@@ -37,6 +37,12 @@ class Resampler:
         """Index and time of the newest reading."""
         return (int(self._index[self._end - 1]), float(self._time[self._end - 1])) if self._end else None
 
+    def values(self, begin: float) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+        """Times of the readings from the sensor's second `begin` on, and which of them are counts, shape (n,) each."""
+        first = int(np.searchsorted(self._time[: self._end], begin))
+        kept = slice(first, self._end)
+        return self._time[kept].copy(), np.abs(self._counts[kept].astype(np.int32)) <= self._largest
+
     def clear(self) -> None:
         """Discard all readings."""
         self._end = 0

@@ -1,13 +1,14 @@
 """Values of a sensor with a free-running clock, interpolated to the sample clock."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drivers.rig import Alignment
 from drivers.timebase.clocks import SampleClock, SensorClock
+from drivers.timebase.marking import Mark, Pulses, marked_point
 from drivers.timebase.resampling import Marks, Plausibility, Resampler
 
 
@@ -124,12 +125,14 @@ class SensorTrack:
         self._marks = marks
         self._sensor = SensorClock()
         self._course = Course()
+        self._mark: Mark | None = None
         self._values = self._lost = self._late = 0
         self._asked = 0.0
 
     def begin(self) -> None:
         """Begin a run: the counts of values restart, and the history of the sensor's clock is kept."""
         self._course = Course()
+        self._mark = None
         self._values = self._lost = self._late = 0
         self._plausibility.count = 0
         self._asked = 0.0
@@ -154,6 +157,19 @@ class SensorTrack:
         if line is None or last is None:
             return -np.inf
         return self._course.reach(line, last[1])
+
+    def mark(self, clock: SampleClock, pulses: Pulses) -> bool:
+        """Align the clock by pulses that have switched the sensor's beam off. Returns False if it has not followed."""
+        self._mark = None
+        line = self._line(clock)
+        if line is None:
+            return False
+        # times relative to the newest reading, to avoid rounding errors on clocks that have run for weeks
+        begin = line.time_at(0.0)
+        time, is_lit = self._resampler.values(begin)
+        mark = marked_point(pulses, time - line.time, is_lit, line.rate, line.seconds - self._delay)
+        self._mark = None if mark is None else replace(mark, time=line.time + mark.time)
+        return mark is not None
 
     def counts(self, clock: SampleClock, first: int, n: int, sample_rate: float) -> NDArray[np.int16]:
         """Counts at `n` samples from `first` on, shape (n,): interpolated between two values, or the fault mark of one
@@ -183,6 +199,7 @@ class SensorTrack:
             lost=self._lost + (int(behind * self._rate) if behind > 0.0 else 0),
             late=self._late,
             implausible=self._plausibility.count,
+            mark_uncertainty=np.inf if self._mark is None else self._mark.uncertainty,
         )
 
     def _add(
@@ -199,7 +216,7 @@ class SensorTrack:
         if last is not None and time[0] < last[1] - _BACK:
             self._resampler.clear()
             self._plausibility.restart()
-            self._sensor, self._course = SensorClock(), Course()
+            self._sensor, self._course, self._mark = SensorClock(), Course(), None
             last = None
         newest = np.maximum.accumulate(np.concatenate(([-np.inf if last is None else last[1]], time[:-1])))
         fresh = np.flatnonzero(time > newest)
@@ -217,6 +234,9 @@ class SensorTrack:
         last = self._resampler.last
         if last is None or self._sensor.history < _LEAST_HISTORY:
             return None
+        if self._mark is not None:
+            mark, rate = self._mark, self._sensor.rate * clock.rate
+            return Line(last[1], mark.seconds + rate * (last[1] - mark.time) + self._delay, rate)
         arrival = self._sensor.offset + self._sensor.rate * last[1]
         seconds = float(clock.seconds(np.array([arrival]))[0]) + self._delay
         return None if np.isnan(seconds) else Line(last[1], seconds, self._sensor.rate * clock.rate)

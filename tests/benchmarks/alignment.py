@@ -1,12 +1,17 @@
 """How well serial lasers are placed on the DAQ's sample clock, against the truth that the emulated laboratory knows.
 
-    python -m tests.benchmarks.alignment [--seconds 15] [--restarts 20]
+    python -m tests.benchmarks.alignment [--method watch|marker|both] [--seconds 15] [--restarts 20] [--known-delay]
 
-1. `rockbench check` measures the delay that is left and says what `hardware.lasers.delay` should be.
+For each method:
+
+1. `rockbench check` measures the delay that is left and says what `hardware.lasers.delay` should be. With
+   `--known-delay` it is that of the filter cards, which leaves the biases of the method itself.
 2. With that value, sessions that each open the bench anew: where each laser's value was placed, against where it was
-   really taken. The DAQ's channels lag by the delay of their filter cards, and the lasers are to lag by the same.
+   really taken, after the first block and at the end. The DAQ's channels lag by the delay of their filter cards, and
+   the lasers are to lag by the same. Time stamps count 10 us; what an exposure is later than its stamp is taken out.
 
-The sample clock is read by a process of its own (`drivers.daqmx.clock_watch`).
+watch: the sample clock is read by a process of its own (`drivers.daqmx.clock_watch`). marker: pulses of a counter
+switch the lasers off at arming (`drivers.timebase.marking`).
 """
 
 import argparse
@@ -21,13 +26,15 @@ import numpy as np
 from bench.config.model import BenchConfiguration
 from bench.config.template import as_toml
 from drivers.emulation.control import ask
+from drivers.hardware.parameters import Hardware
 from drivers.hardware.rig import HardwareRig
 from drivers.rig import Alignment
 from tests.emulated import emulated
 from tests.lateness import Lateness
 
 BLOCK, LEAD = 200, 800
-ALLOWED = 20e-6
+ALLOWED = {"watch": 20e-6, "marker": 10e-6}
+COUNTER = "Dev1/ctr0"
 
 
 def checked_delay(configuration: BenchConfiguration) -> float:
@@ -45,55 +52,82 @@ def checked_delay(configuration: BenchConfiguration) -> float:
     raise SystemExit(f"the check measured no delay:\n{done.stderr}")
 
 
-def errors(one: Alignment, truth: dict[str, float], zero: float, clock: float, lag: float, until: float) -> np.ndarray:
-    """Placed less true time [s] of values of a laser, through the run: `clock` is true over nominal sample rate."""
-    taken = np.linspace(0.0, until, 200)
-    host = zero + taken / clock
-    sensor = (host - truth["epoch"]) * truth["rate"] / truth["nominal"]
-    return one.offset + one.rate * sensor + one.delay - (taken + lag)
+def error(one: Alignment, truth: dict[str, float], zero: float, clock: float, lag: float, at: float) -> float:
+    """Placed less true time [s] of a value at second `at` of the run: `clock` is true over nominal sample rate."""
+    sensor = (zero + at / clock - truth["epoch"]) * truth["rate"] / truth["nominal"] - truth["stamp_lag"]
+    return one.offset + one.rate * sensor + one.delay - (at + lag)
 
 
-def measure(seconds: float, restarts: int) -> bool:
-    """Print the errors of each session at its end, and whether all are below what is allowed."""
+PLACES = ("at the marks", "after the first block", "at the end")
+
+
+def session(hardware: Hardware, lag: float, seconds: float) -> list[tuple[float, ...]]:
+    """For each laser: its errors at `PLACES` [s], and that of its rate at the end [1]. Without marks, the first place
+    is the start of the run."""
+    with HardwareRig(hardware, lead=LEAD) as rig:
+        rig.arm()
+        rig.write(np.zeros(LEAD))
+        found: list[list[float]] = []
+        rates: list[float] = []
+        blocks = round(seconds * rig.sample_rate / BLOCK)
+        for block in range(1, blocks + 1):
+            rig.write(np.zeros(BLOCK))
+            rig.read(BLOCK)
+            if block not in (1, blocks):
+                continue
+            truth, at = ask(str(hardware.emulator_address), "truth"), block * BLOCK / rig.sample_rate
+            clock = truth["sample_rate"] / hardware.sample_rate
+            zero = truth["first_sample"] + rig.skipped / truth["sample_rate"]
+            lasers = [{**laser, "nominal": hardware.lasers.rate} for laser in truth["lasers"]]
+            pairs = list(zip(rig.alignments, lasers, strict=True))
+            middle = -0.5 * rig.skipped / rig.sample_rate
+            found += [
+                [error(one, laser, zero, clock, lag, place) for one, laser in pairs]
+                for place in ((middle, at) if block == 1 else (at,))
+            ]
+            rates = [one.rate - clock * laser["nominal"] / laser["rate"] for one, laser in pairs]
+        rig.stop()
+    return list(zip(*found, rates, strict=True))
+
+
+def measure(method: str, seconds: float, restarts: int, *, known: bool) -> bool:
+    """Print the errors of each session, and whether all are below what is allowed."""
     with emulated("--clock-error", "12e-6", "30e-6", "-21e-6") as configuration:
         hardware = configuration.hardware
-        delay = checked_delay(configuration)
-        print(f"delay as configured {1e3 * hardware.lasers.delay:.3f} ms, as the check says {1e3 * delay:.3f} ms")
-        hardware = hardware.model_copy(update={"lasers": hardware.lasers.model_copy(update={"delay": delay})})
+        daq = hardware.daq.model_copy(update={"laser_marker": COUNTER if method == "marker" else None})
+        hardware = hardware.model_copy(update={"daq": daq})
         lag = configuration.simulation.bench.filter_unit.delay(hardware.sample_rate)
-        found: list[float] = []
-        print(f"{'session':>7}  {'laser_1: error, rate':>28}  {'laser_2: error, rate':>28}")
-        for session in range(1, restarts + 1):
-            with HardwareRig(hardware, lead=LEAD) as rig, Lateness() as lateness:
-                rig.arm()
-                rig.write(np.zeros(LEAD))
-                blocks = round(seconds * rig.sample_rate / BLOCK)
-                for _ in range(blocks):
-                    rig.write(np.zeros(BLOCK))
-                    rig.read(BLOCK)
-                truth, until = ask(str(hardware.emulator_address), "truth"), blocks * BLOCK / rig.sample_rate
-                clock = truth["sample_rate"] / hardware.sample_rate
-                row: list[str] = []
-                for one, laser in zip(rig.alignments, truth["lasers"], strict=True):
-                    known = {**laser, "nominal": hardware.lasers.rate}
-                    # where the next values go
-                    error = errors(one, known, truth["first_sample"], clock, lag, until)[-1]
-                    true_rate = clock * hardware.lasers.rate / laser["rate"]
-                    row.append(f"{1e6 * error:+10.1f} us {1e6 * (one.rate - true_rate):+7.2f} ppm off")
-                    found.append(error)
-                rig.stop()
-            excuse = lateness.excuse or ""
-            print(f"{session:7d}  {row[0]:>28}  {row[1]:>28}  {excuse}", flush=True)
-    worst, rms = float(np.abs(found).max()), float(np.sqrt(np.mean(np.square(found))))
-    verdict = "met" if worst < ALLOWED else "NOT MET"
-    told = f"worst {1e6 * worst:.1f} us, rms {1e6 * rms:.1f} us, allowed {1e6 * ALLOWED:.0f} us"
-    print(f"watch of the clock: {told}: {verdict}")
-    return worst < ALLOWED
+        delay = lag if known else checked_delay(configuration.model_copy(update={"hardware": hardware}))
+        source = "known" if known else "by the check"
+        print(f"{method}: delay as configured {1e3 * hardware.lasers.delay:.3f} ms, {source} {1e3 * delay:.3f} ms")
+        hardware = hardware.model_copy(update={"lasers": hardware.lasers.model_copy(update={"delay": delay})})
+        found: list[tuple[float, ...]] = []
+        print(f"{'session':>7}  laser 1, laser 2: error {', '.join(PLACES)}, of the rate at the end [us, ppm]")
+        for number in range(1, restarts + 1):
+            with Lateness() as lateness:
+                lasers = session(hardware, lag, seconds)
+            found += lasers
+            row = "   ".join(" ".join(f"{1e6 * one:+8.1f}" for one in errors) for errors in lasers)
+            print(f"{number:7d}  {row}  {lateness.excuse or ''}", flush=True)
+    met = True
+    for column, place in enumerate(PLACES):
+        errors = np.array([one[column] for one in found])
+        worst, rms = float(np.abs(errors).max()), float(np.sqrt(np.mean(errors**2)))
+        met &= worst < ALLOWED[method]
+        told = f"worst {1e6 * worst:.1f} us, rms {1e6 * rms:.1f} us, mean {1e6 * errors.mean():+.1f} us"
+        told += f", scatter {1e6 * errors.std():.1f} us"
+        verdict = "met" if worst < ALLOWED[method] else "NOT MET"
+        print(f"{method}, {place}: {told}, allowed {1e6 * ALLOWED[method]:.0f} us: {verdict}")
+    return met
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser.add_argument("--method", choices=("watch", "marker", "both"), default="both")
     parser.add_argument("--seconds", type=float, default=15.0)
     parser.add_argument("--restarts", type=int, default=20)
+    parser.add_argument("--known-delay", action="store_true")
     given = parser.parse_args()
-    sys.exit(0 if measure(given.seconds, given.restarts) else 1)
+    methods = ("watch", "marker") if given.method == "both" else (given.method,)
+    results = [measure(method, given.seconds, given.restarts, known=given.known_delay) for method in methods]
+    sys.exit(0 if all(results) else 1)

@@ -95,6 +95,7 @@ class DeviceModel:
     input_lines: int = 0
     direction_group: int = 1
     watchdog: float | None = None
+    counters: int = 0
     input_engines: tuple[str, ...] = ("ai",)
     output_engines: tuple[str, ...] = ("ao",)
 
@@ -107,6 +108,11 @@ class DeviceModel:
     def output_names(self) -> tuple[str, ...]:
         """Physical channels of the outputs."""
         return tuple(f"{self.name}/ao{k}" for k in range(self.outputs.count if self.outputs else 0))
+
+    @property
+    def counter_names(self) -> tuple[str, ...]:
+        """Counters that can generate pulses."""
+        return tuple(f"{self.name}/ctr{k}" for k in range(self.counters))
 
     @property
     def line_names(self) -> tuple[str, ...]:

@@ -44,6 +44,7 @@ class Driver:
         """Tick of the first sample of the clocked task that was started last."""
         self.instant = Instant(plant.tick)
         self.lines = Lines(wires)
+        self.wires = wires
         self.terminals = {name: OutputTerminal(self.instant) for device in devices for name in device.output_names}
         self._tasks: dict[str, Task] = {}
         self._reserved: dict[str, Task] = {}

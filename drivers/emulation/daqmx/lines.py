@@ -6,17 +6,19 @@ from dataclasses import dataclass, field
 
 from nidaqmx.error_codes import DAQmxErrors
 
+from drivers.emulation.daqmx.counter import Edges
 from drivers.emulation.daqmx.errors import DaqmxFailure
 
 
 @dataclass(frozen=True)
 class Wires:
-    """Wiring by line name: receivers of an output line's level (`listeners`), sources of an input line's level
-    (`shown`).
+    """Wiring by name: receivers of an output line's level (`listeners`) and of a counter's edges (`counters`), sources
+    of an input line's level (`shown`).
     """
 
     listeners: Mapping[str, Callable[[bool], None]] = field(default_factory=dict[str, Callable[[bool], None]])
     shown: Mapping[str, Callable[[], bool]] = field(default_factory=dict[str, Callable[[], bool]])
+    counters: Mapping[str, Edges] = field(default_factory=dict[str, Edges])
 
 
 class Lines:

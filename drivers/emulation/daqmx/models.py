@@ -41,6 +41,7 @@ def x_series(name: str = "Dev1", *, simulated: bool = False, calibrated: bool = 
         lines=32,
         input_lines=32,
         watchdog=34.0,
+        counters=4,
     )
 
 
@@ -108,6 +109,10 @@ class Catalogue:
     def output(self, channel: str) -> tuple[DeviceModel, int]:
         """The device of an analogue output and the number of the output."""
         return self._find(channel, "output_names")
+
+    def counter(self, counter: str) -> tuple[DeviceModel, int]:
+        """The device of a counter and its number."""
+        return self._find(counter, "counter_names")
 
     def line(self, line: str) -> tuple[DeviceModel, int]:
         """The device of a digital output line and the number of the line."""

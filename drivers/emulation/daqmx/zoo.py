@@ -120,7 +120,8 @@ CHASSIS: dict[str, tuple[int, DeviceModel]] = {
 def _x_series(product: str, *, transfer_condition: bool) -> DeviceModel:
     """An NI 6351: a multiplexed converter of 1.25 MS/s, 1 MS/s over several channels (6368 User Manual, table 4-5).
 
-    Its watchdog acts on digital lines only (X Series User Manual, "Digital Output", "Watchdog Timer").
+    Its watchdog acts on digital lines only (X Series User Manual, "Digital Output", "Watchdog Timer"). It has four
+    counters (X Series User Manual, "Counters").
     """
     return DeviceModel(
         "Dev1",
@@ -140,6 +141,7 @@ def _x_series(product: str, *, transfer_condition: bool) -> DeviceModel:
         lines=8,
         input_lines=8,
         watchdog=34.0,
+        counters=4,
     )
 
 

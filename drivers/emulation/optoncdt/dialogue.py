@@ -22,9 +22,49 @@ _SPEED_AT = 40
 """Offset of the output speed in the reply: after four flags, a byte, nineteen control characters and one speed."""
 _MOST = 4096
 """Bytes per read."""
+_CAPACITY = 640 * 1024
+"""Bytes that Linux keeps for a serial port whose reader is late (TTYB_DEFAULT_MEM_LIMIT); for a pseudo-terminal, only
+16 KiB, a third of a second at full rate.
+"""
 
 
-class PseudoTerminal:
+class SerialLine:
+    """Buffer of the instrument's end of a serial line."""
+
+    def __init__(self) -> None:
+        self._pending = b""
+        self.dropped = 0
+        """Number of bytes lost because the client did not read them in time."""
+
+    @property
+    def pending(self) -> int:
+        """Number of bytes that the system has not yet accepted."""
+        return len(self._pending)
+
+    def write(self, sent: bytes) -> None:
+        """Send bytes, after those still pending; those beyond the capacity of a serial port's buffer are lost."""
+        kept = sent[: max(_CAPACITY - len(self._pending), 0)]
+        self.dropped += len(sent) - len(kept)
+        self._pending += kept
+        if not self._pending:
+            return
+        try:
+            self._pending = self._pending[self.send(self._pending) :]
+        except BlockingIOError:
+            return
+        except OSError:
+            self._pending = b""
+
+    def discard(self) -> None:
+        """Discard the pending bytes, as when no client is connected."""
+        self._pending = b""
+
+    def send(self, pending: bytes) -> int:
+        """Pass bytes to the system; returns the number that it accepted. Raises OSError."""
+        raise NotImplementedError
+
+
+class PseudoTerminal(SerialLine):
     """The instrument's end of a serial line. No call blocks.
 
     Raises DeviceNotFound on a system without pseudo-terminals.
@@ -34,8 +74,9 @@ class PseudoTerminal:
         if sys.platform == "win32":
             raise DeviceNotFound(
                 "an emulated laser on a serial line is refused: Windows has no pseudo-terminals;"
-                " use the analogue connection, or run the emulated laboratory on Linux"
+                " use the socket or the analogue connection"
             )
+        super().__init__()
         self._end, other = os.openpty()
         self.port = os.ttyname(other)
         """Path of the client's end."""
@@ -46,8 +87,6 @@ class PseudoTerminal:
         self._watch = select.poll()
         self._watch.register(self._end, select.POLLIN)
         self._open = True
-        self.dropped = 0
-        """Number of bytes lost because the client did not read them in time."""
 
     @property
     def connected(self) -> bool:
@@ -70,15 +109,8 @@ class PseudoTerminal:
             # no data yet, or the client has disconnected
             return b""
 
-    def write(self, sent: bytes) -> None:
-        """Send bytes; those beyond the capacity of the client's buffer are lost, as on a real line."""
-        try:
-            taken = os.write(self._end, sent)
-        except BlockingIOError:
-            taken = 0
-        except OSError:
-            return
-        self.dropped += len(sent) - taken
+    def send(self, pending: bytes) -> int:
+        return os.write(self._end, pending)
 
     def close(self) -> None:
         """Close the line; the client's next access fails. May be called repeatedly."""

@@ -13,6 +13,7 @@ from drivers.emulation.optoncdt.dialogue import Dialogue, PseudoTerminal
 from drivers.emulation.optoncdt.evaluation import WORD, Fault
 from drivers.emulation.optoncdt.sensor import Sensor
 from drivers.emulation.optoncdt.settings import Settings
+from drivers.emulation.optoncdt.socket_line import SocketLine
 from drivers.emulation.plant import Sight
 from sim import waiting
 from sim.sensors import Laser
@@ -82,9 +83,9 @@ class EmulatedLaser:
     The constructor switches it on, and it serves its line from `start()` on. `as_found` are the settings at power-up;
     by default it does not stream. `clock_error` is the relative error of its clock, by default that of `laser`. `rates`
     [1/s], `password` and `boot_time` [s] differ between versions of the sensor or are not documented. Every method may
-    be called from any thread.
+    be called from any thread. With `network`, the port is a socket, to which baud rates do not apply.
 
-    Raises DeviceNotFound on Windows, which has no pseudo-terminals.
+    Raises DeviceNotFound for another port on Windows, which has no pseudo-terminals.
     """
 
     def __init__(
@@ -99,15 +100,18 @@ class EmulatedLaser:
         rates: tuple[float, ...] = _RATES,
         password: str = "000",
         boot_time: float = 0.5,
+        network: bool = False,
     ) -> None:
         random = np.random.default_rng(seed)
-        self._terminal = PseudoTerminal()
+        self._terminal = SocketLine() if network else PseudoTerminal()
         self._line = Line(random)
         error = laser.clock_error if clock_error is None else clock_error
         self._sensor = Sensor(sight, laser, error, random, as_found or Settings(), time.monotonic())
         identity = Identity(f"ILD1420-{1e3 * laser.measuring_range:g}", serial, laser.measuring_range)
         self._dialogue = Dialogue(self._sensor, Actions(self._sensor, identity, password, boot_time), rates)
         self._lock = threading.Lock()
+        self._served = self._delivered = np.inf
+        self._lateness = 0.0
         self._over = False
         self._thread = threading.Thread(target=self._serve, name=f"emulated {identity.name}", daemon=True)
 
@@ -137,8 +141,16 @@ class EmulatedLaser:
 
     @property
     def dropped(self) -> int:
-        """Bytes lost because the client's buffer was full."""
+        """Bytes lost because the buffer of the client's port was full."""
         return self._terminal.dropped
+
+    def take_lateness(self) -> float:
+        """Longest delay [s] since the last call with which this computer has sent a value, in addition to that of a
+        sensor.
+        """
+        with self._lock:
+            lateness, self._lateness = self._lateness, 0.0
+        return lateness
 
     @property
     def epoch(self) -> float:
@@ -151,6 +163,12 @@ class EmulatedLaser:
         """Measurements per second of host time."""
         with self._lock:
             return self._sensor.grid.rate
+
+    @property
+    def stamp_lag(self) -> float:
+        """Time by which the time stamps are earlier than the exposures, less than a tick [s of the sensor's clock]."""
+        with self._lock:
+            return self._sensor.grid.stamp_lag
 
     def host_time_of(self, index: int) -> float:
         """Host time of an exposure at the present rate [s]; `index` is its counter, continued beyond 18 bits."""
@@ -188,6 +206,11 @@ class EmulatedLaser:
         with self._lock:
             self._sensor.beam = True
 
+    def switch(self, times: NDArray[np.float64]) -> None:
+        """Open and close the input that switches the laser on, in turn, at ascending host times [s]; none: closed."""
+        # without the lock: the device calls this while it holds locks for which the thread of the line may wait
+        self._sensor.switching = times
+
     def target(self, place: Literal["too close", "too far", "none"] | None) -> None:
         """Replace the target by one that is too close, too far or missing; None restores the original sight."""
         with self._lock:
@@ -208,15 +231,26 @@ class EmulatedLaser:
                 self._turn(time.monotonic())
             time.sleep(_TURN)
 
+    def _note_lateness(self, now: float) -> None:
+        """Record the time since the previous turn, and since the system accepted the last byte."""
+        if self._terminal.pending == 0:
+            self._delivered = now
+        self._lateness = max(self._lateness, now - self._served - _TURN, now - self._delivered)
+        self._served = now
+
     def _turn(self, now: float) -> None:
         received = self._terminal.read()
         # read after the data, since a client configures the port before it sends data
-        connected, read_at, baud = self._terminal.connected, self._terminal.baud, self._sensor.settings.baud
+        connected, baud = self._terminal.connected, self._sensor.settings.baud
+        read_at = self._terminal.baud or baud
         if read_at != baud:
             # at the wrong rate no command is recognised, and the received bytes corrupt the next one
             received = b"\xff" * len(received)
         stream = self._sensor.stream(now)
         answer = self._dialogue.receive(received, now)
         sent = self._line.carried(stream, answer, now)
-        if connected and sent.size:
+        if connected:
             self._terminal.write((sent if read_at == baud else self._line.misread(sent, baud, read_at)).tobytes())
+        else:
+            self._terminal.discard()
+        self._note_lateness(now)

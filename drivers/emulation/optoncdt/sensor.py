@@ -67,6 +67,12 @@ class Grid:
         """The 32-bit time stamps of exposures at `times`, in ticks."""
         return np.floor(self.epoch.since(times) * (self._pace * TICKS)).astype(np.int64) & 0xFFFFFFFF
 
+    @property
+    def stamp_lag(self) -> float:
+        """Time since the last tick of the time stamp at each exposure [s]; a cycle is a whole number of ticks."""
+        ticks = (float(self.times(np.array([self.first]))[0]) - self.epoch.now) * self._pace * TICKS
+        return (ticks - floor(ticks)) / TICKS
+
 
 PIPELINE = 3
 """Measuring cycles between exposure and output (manual of the optoNCDT 1420, p. 52, and of the 1320, p. 42)."""
@@ -104,6 +110,8 @@ class Sensor:
         self.stored = as_found
         self.beam = True
         """Whether the input that switches the laser on is tied to ground."""
+        self.switching = np.zeros(0)
+        """Ascending host times [s] at which the input that switches the laser on is opened and closed in turn."""
         self.target: Fault | None = None
         """Target that replaces the sight."""
         self.boot(now)
@@ -165,7 +173,13 @@ class Sensor:
         if self.target is not None:
             return np.full(times.size, np.nan), np.full(times.size, self.target)
         shares = self._optics.shares(self._sight.displacement(times))
-        return shares, faults_of(shares)
+        faults = faults_of(shares)
+        # another thread may replace it
+        switching = self.switching
+        if switching.size:
+            dark = np.searchsorted(switching, times, side="right") % 2 == 1
+            shares[dark], faults[dark] = np.nan, Fault.LASER_OFF
+        return shares, faults
 
     def _blocks(self, numbers: Codes) -> Codes:
         """Transmitted values of the exposures `numbers`, shape (n, values)."""

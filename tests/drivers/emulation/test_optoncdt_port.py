@@ -196,7 +196,10 @@ def test_the_port_can_be_opened_again_and_again(make: Make, connect: Open) -> No
         port.close()
 
 
-def test_a_reader_that_is_too_slow_loses_values_and_delays_nothing(make: Make, connect: Open) -> None:
+def test_a_reader_that_is_too_slow_loses_values_and_delays_nothing(
+    make: Make, connect: Open, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("drivers.emulation.optoncdt.dialogue._CAPACITY", 2000)
     sensor = make(as_found=STREAMING)
     port = connect(sensor)
     wait(lambda: sensor.dropped > 2000)
@@ -207,6 +210,18 @@ def test_a_reader_that_is_too_slow_loses_values_and_delays_nothing(make: Make, c
     last = sensor.host_time_of(int(found[-1, 1]))
     assert time.monotonic() - last < 1.0
     assert say(port, "OUTPUT NONE") == "OUTPUT NONE ok\r\n"
+
+
+def test_a_port_keeps_more_than_a_pseudo_terminal_and_says_how_late_it_was(make: Make, connect: Open) -> None:
+    """A pseudo-terminal takes 16 KiB, a third of a second at full rate."""
+    sensor = make(as_found=STREAMING)
+    port = connect(sensor)
+    sensor.take_lateness()
+    wait(lambda: sensor._terminal.pending > 6000)  # pyright: ignore[reportPrivateUsage]
+    found = blocks(receive(port, enough(24_000)), 4)
+    assert (np.diff(found[:, 1]) == 1).all()
+    assert sensor.dropped == 0
+    assert sensor.take_lateness() > 0.1
 
 
 def test_errors_in_place_of_distances(make: Make, connect: Open) -> None:

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drivers.emulation.optoncdt.evaluation import Fault
+from drivers.emulation.optoncdt.sensor import TICKS, Grid
 from sim.sensors import Laser
 from tests.drivers.emulation.optoncdt_client import PERFECT, Bare, Seen, blocks, metres, still
 
@@ -224,3 +225,12 @@ def test_errors_of_the_optics_are_those_of_the_simulated_laser() -> None:
     error = np.array([metres(a) - metres(b) for a, b in zip(swept, straight, strict=True)])
     assert error.max() == pytest.approx(0.0002, rel=0.02)
     assert error.min() == pytest.approx(-0.0002, rel=0.02)
+
+
+def test_the_stamps_of_all_exposures_are_early_by_the_same_part_of_a_tick() -> None:
+    grid = Grid(4000.0, 30e-6, 0.123456)
+    grid.epoch.reset(5.0004321)
+    times = grid.times(np.arange(21_000, 22_000))
+    early = (times - 5.0004321) * (1.0 + 30e-6) - grid.stamps(times) / TICKS
+    np.testing.assert_allclose(early, grid.stamp_lag, atol=1e-9)
+    assert 0.0 < grid.stamp_lag < 1.0 / TICKS

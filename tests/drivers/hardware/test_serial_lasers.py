@@ -68,7 +68,7 @@ class Run:
         count = int((asked - self.began) * RATE) + 1
         self.lasers.observe(asked, count, asked)
         begun = now()
-        counts = self.lasers.counts(self.first, self.n)
+        counts = self.lasers.counts(self.first, self.n, self.n)
         self.first += self.n
         return counts, now() - begun
 

@@ -1,5 +1,6 @@
 """Driver and emulated sensor, each written from the manual alone, on one line in real time."""
 
+import socket
 import time
 from collections.abc import Callable, Iterator
 
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 
 from drivers.emulation.optoncdt.laser import EmulatedLaser
 from drivers.emulation.optoncdt.settings import Settings
-from drivers.errors import ConnectionLost
+from drivers.errors import ConnectionLost, DeviceNotFound
 from drivers.optoncdt.codec import LASER_OFF, OTHER, marked
 from drivers.optoncdt.search import find_lasers
 from drivers.optoncdt.sensor import SerialLaser
@@ -37,6 +38,40 @@ def emulated() -> Iterator[EmulatedLaser]:
         sensor.start()
         yield sensor
         sensor.close()
+
+
+@pytest.fixture
+def on_network() -> Iterator[EmulatedLaser]:
+    laser = Laser(measuring_range=0.2, noise=0.0, linearity=0.0, clock_error=0.0)
+    with no_thread_left():
+        sensor = EmulatedLaser(Still(), laser, as_found=FOUND, boot_time=0.0, network=True)
+        sensor.start()
+        yield sensor
+        sensor.close()
+
+
+def test_a_sensor_on_a_network_port_is_found_and_read_and_its_loss_reported(on_network: EmulatedLaser) -> None:
+    (found,) = find_lasers([on_network.port])
+    assert found.problem is None
+    with SerialLaser("laser_1", on_network.port, baud=None, rate=1000.0, measuring_range=0.2) as laser:
+        for _ in range(2):
+            laser.start()
+            got = taken_until(laser, lambda got: len(got) > 500)
+            laser.stop()
+            np.testing.assert_allclose(marked(got.code) * (1.02 * 0.2 / 65520), PLACE, atol=2e-6)
+            assert (np.diff(got.index) == 1).all()
+        laser.start()
+        on_network.unplug()
+        with pytest.raises(ConnectionLost):
+            taken_until(laser, lambda _: False)
+    assert on_network.dropped == 0
+
+
+def test_a_network_port_without_a_server_is_named() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = f"socket://127.0.0.1:{server.getsockname()[1]}"
+    with pytest.raises(DeviceNotFound, match=f"laser_1 cannot be opened: {port} does not respond"):
+        SerialLaser("laser_1", port, baud=None, rate=1000.0, measuring_range=0.2)
 
 
 def taken_until(laser: SerialLaser, enough: Callable[[Readings], bool]) -> Readings:

@@ -4,15 +4,14 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import TypeVar
 
 from nidaqmx._stubs import nidaqmx_pb2 as pb
-from nidaqmx.constants import (
-    LineGrouping,
-)
+from nidaqmx.constants import Level, LineGrouping
 from nidaqmx.error_codes import DAQmxErrors
 
 from drivers.emulation.daqmx.analog_input import AnalogInput
 from drivers.emulation.daqmx.analog_output import AnalogOutput, OutputChannel
+from drivers.emulation.daqmx.counter import CounterOutput, PulseChannel
 from drivers.emulation.daqmx.device import InputChannel, InputConverter, require_wiring
-from drivers.emulation.daqmx.errors import DaqmxFailure
+from drivers.emulation.daqmx.errors import DaqmxFailure, NotEmulated
 from drivers.emulation.daqmx.lines import DigitalInput, DigitalOutput, Line, LineChannel
 from drivers.emulation.daqmx.models import unflattened
 from drivers.emulation.daqmx.service.base import Service
@@ -37,7 +36,7 @@ J = TypeVar("J", bound=Job)
 
 
 class ChannelService(Service):
-    """CreateAIVoltageChan, CreateAOVoltageChan, CreateDIChan, CreateDOChan."""
+    """CreateAIVoltageChan, CreateAOVoltageChan, CreateDIChan, CreateDOChan, CreateCOPulseChanTime."""
 
     def CreateAIVoltageChan(
         self, request: pb.CreateAIVoltageChanRequest, context: object
@@ -80,6 +79,20 @@ class ChannelService(Service):
         with self._driver.changed:
             self._job(task, DigitalOutput, lambda: DigitalOutput(self._driver.lines)).outputs.extend(added)
         return pb.CreateDOChanResponse()
+
+    def CreateCOPulseChanTime(
+        self, request: pb.CreateCOPulseChanTimeRequest, context: object
+    ) -> pb.CreateCOPulseChanTimeResponse:
+        task, driver = self._task(request), self._driver
+        task.require_stopped()
+        if task.job is not None or (request.idle_state_raw or request.idle_state) != Level.LOW.value:
+            raise NotEmulated("several counter outputs in one task, or one that is high at rest")
+        device, k = driver.catalogue.counter(request.counter)
+        name = device.counter_names[k]
+        wired = driver.wires.counters.get(name)
+        channel = PulseChannel(name, device.name, request.initial_delay, request.low_time, request.high_time, wired)
+        task.job = CounterOutput(driver.plant, channel)
+        return pb.CreateCOPulseChanTimeResponse()
 
     def _new_inputs(self, request: pb.CreateAIVoltageChanRequest) -> list[InputChannel]:
         added: list[InputChannel] = []

@@ -49,6 +49,7 @@ _TEXTS: Mapping[int, Callable[[DeviceModel], str]] = {
     pb.DEVICE_ATTRIBUTE_PRODUCT_TYPE: lambda device: device.product,
     pb.DEVICE_ATTRIBUTE_AI_PHYSICAL_CHANS: lambda device: flattened(device.input_names),
     pb.DEVICE_ATTRIBUTE_AO_PHYSICAL_CHANS: lambda device: flattened(device.output_names),
+    pb.DEVICE_ATTRIBUTE_CO_PHYSICAL_CHANS: lambda device: flattened(device.counter_names),
     pb.DEVICE_ATTRIBUTE_DI_LINES: lambda device: flattened(device.input_line_names),
     pb.DEVICE_ATTRIBUTE_DO_LINES: lambda device: flattened(device.line_names),
     pb.DEVICE_ATTRIBUTE_CHASSIS_MODULE_DEV_NAMES: lambda device: flattened(device.modules),

@@ -8,6 +8,7 @@ from nidaqmx.constants import AcquisitionType, Edge
 from drivers.emulation.daqmx.analog_input import AnalogInput
 from drivers.emulation.daqmx.analog_output import AnalogOutput
 from drivers.emulation.daqmx.conversion import delta_sigma_rate
+from drivers.emulation.daqmx.counter import CounterOutput
 from drivers.emulation.daqmx.engines import undefined
 from drivers.emulation.daqmx.errors import NotEmulated
 from drivers.emulation.daqmx.service.base import AboutTask, Service, attribute_of, unsupported
@@ -32,7 +33,9 @@ def _conversion_rate(job: Sampled, device: str) -> float:
 
 
 class TimingService(Service):
-    """CfgSampClkTiming, CfgDigEdgeStartTrig, DisableStartTrig, timing, trigger and buffer attributes."""
+    """CfgSampClkTiming, CfgImplicitTiming, CfgDigEdgeStartTrig, DisableStartTrig; attributes of timing, triggers and
+    buffers.
+    """
 
     def CfgSampClkTiming(self, request: pb.CfgSampClkTimingRequest, context: object) -> pb.CfgSampClkTimingResponse:
         job = self._changeable(request)
@@ -50,6 +53,12 @@ class TimingService(Service):
         else:
             job.clock = sample_clock(request.rate, job.highest_rate, tick_rate, request.samps_per_chan, error)
         return pb.CfgSampClkTimingResponse()
+
+    def CfgImplicitTiming(self, request: pb.CfgImplicitTimingRequest, context: object) -> pb.CfgImplicitTimingResponse:
+        if (request.sample_mode_raw or request.sample_mode) != AcquisitionType.FINITE.value:
+            raise NotEmulated("a counter output without end")
+        self._task(request).doing(CounterOutput).pulses = request.samps_per_chan
+        return pb.CfgImplicitTimingResponse()
 
     def GetTimingAttributeDouble(
         self, request: pb.GetTimingAttributeDoubleRequest, context: object
@@ -120,7 +129,8 @@ class TimingService(Service):
     ) -> pb.CfgDigEdgeStartTrigResponse:
         if (request.trigger_edge_raw or request.trigger_edge) != Edge.RISING.value:
             raise NotEmulated("a start trigger on a falling edge")
-        self._changeable(request).awaited = request.trigger_source
+        job = self._task(request).required_job
+        (job if isinstance(job, CounterOutput) else self._changeable(request)).awaited = request.trigger_source
         return pb.CfgDigEdgeStartTrigResponse()
 
     def DisableStartTrig(self, request: pb.DisableStartTrigRequest, context: object) -> pb.DisableStartTrigResponse:

@@ -1,0 +1,62 @@
+"""Counter output that switches the lasers off at known times of the sample clock."""
+
+from nidaqmx.constants import AcquisitionType
+
+from drivers.daqmx import library
+from drivers.daqmx.connection import Connection
+from drivers.daqmx.errors import translated
+from drivers.daqmx.parameters import AUTOMATIC, Daq, device_name
+from drivers.timebase.marking import Pulses
+
+NAME = "rockbench_marker"
+
+
+class Marker:
+    """Train of `pulses` that begins with the sample clock of each run, at `daq.laser_marker`.
+
+    The lasers are on while the output is low. Counters and sample clock have one timebase on a device.
+    """
+
+    def __init__(self, connection: Connection, daq: Daq, pulses: Pulses) -> None:
+        self._connection, self._pulses = connection, pulses
+        self._task: library.Task | None = None
+        self.counter = _counter(connection, daq)
+
+    def prepare(self, trigger: str) -> None:
+        """Create the task, with the output low, that starts on `trigger`."""
+        self.clear()
+        if self.counter is None:
+            return
+        pulses = self._pulses
+        with translated(f"preparing the pulses of {self.counter}"):
+            self._task = task = library.task(NAME, self._connection.options(NAME))
+            task.co_channels.add_co_pulse_chan_time(
+                self.counter, initial_delay=pulses.delay, low_time=pulses.low, high_time=pulses.high
+            )
+            task.timing.cfg_implicit_timing(sample_mode=AcquisitionType.FINITE, samps_per_chan=pulses.number)
+            task.triggers.start_trigger.cfg_dig_edge_start_trig(trigger)
+
+    def arm(self) -> None:
+        """Arm the task on its trigger."""
+        if self._task is not None:
+            with translated(f"arming the pulses of {self.counter}"):
+                self._task.start()
+
+    def clear(self) -> None:
+        """End the pulses; the output is low."""
+        task, self._task = self._task, None
+        if task is not None:
+            with translated("clearing the task of the pulses"):
+                task.close()
+
+
+def _counter(connection: Connection, daq: Daq) -> str | None:
+    """The configured counter; with `automatic`, the first one of the device of the output, None without counters."""
+    if daq.laser_marker != AUTOMATIC:
+        return daq.laser_marker
+    with translated("looking for a counter"):
+        name = device_name(daq.output).lower()
+        for device in library.system(connection.options()).devices:
+            if device.name.lower() == name:
+                return next((counter.name for counter in device.co_physical_chans), None)
+    return None

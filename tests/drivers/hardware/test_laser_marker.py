@@ -1,0 +1,81 @@
+"""Lasers aligned by pulses of a counter, on the emulated laboratory, against its truth."""
+
+import sys
+import threading
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from drivers.daqmx.parameters import AUTOMATIC
+from drivers.emulation.laboratory import Laboratory
+from drivers.errors import RigError
+from drivers.hardware.parameters import Hardware
+from drivers.hardware.rig import HardwareRig
+from sim.specimen import Specimen
+from sim.virtual_bench import VirtualBenchParameters
+
+pytestmark = [
+    pytest.mark.skipif(sys.platform == "win32", reason="emulated serial lasers need pseudo-terminals"),
+    pytest.mark.milliseconds,
+]
+
+LEAD, BLOCK = 2000, 200
+
+
+@pytest.fixture(scope="module")
+def laboratory() -> Iterator[Laboratory]:
+    with Laboratory(VirtualBenchParameters(), Specimen(), seed=1) as emulated:
+        yield emulated
+
+
+def marked_by(laboratory: Laboratory, counter: str) -> Hardware:
+    hardware = laboratory.hardware
+    daq = hardware.daq.model_copy(update={"laser_marker": counter})
+    return hardware.model_copy(
+        update={"daq": daq, "lasers": hardware.lasers.model_copy(update={"observation_time": 1.0, "delay": 0.0})}
+    )
+
+
+def started(rig: HardwareRig) -> None:
+    rig.arm()
+    rig.write(np.zeros(LEAD))
+
+
+def test_the_lasers_are_aligned_at_arming(laboratory: Laboratory) -> None:
+    with HardwareRig(marked_by(laboratory, AUTOMATIC), lead=LEAD - BLOCK) as rig:
+        started(rig)
+        block = rig.read(BLOCK)
+        assert block.first == 0
+        clock = laboratory.bench.rate_true / rig.sample_rate
+        assert laboratory.daq.first_sample is not None
+        zero = laboratory.daq.first_sample + rig.skipped / laboratory.bench.rate_true
+        for one, laser in zip(rig.alignments, laboratory.lasers, strict=True):
+            assert one.mark_uncertainty < 10e-6
+            # at the middle of the pulses, where the rates of the clocks have the least effect
+            middle = -0.5 * rig.skipped / rig.sample_rate
+            sensor = (zero + middle / clock - laser.epoch) * laser.rate_true / 4000.0 - laser.stamp_lag
+            assert abs(one.offset + one.rate * sensor - middle) < 20e-6
+        names = [channel.name for channel in rig.channels]
+        # the pulses have ended before the first sample
+        for name in ("laser_1", "laser_2"):
+            column = names.index(name)
+            assert not np.isnan(rig.channels[column].to_unit(block.counts[:, column])).all()
+
+
+def test_lasers_that_do_not_follow_are_named(laboratory: Laboratory) -> None:
+    with HardwareRig(marked_by(laboratory, "Dev1/ctr1"), lead=LEAD - BLOCK) as rig:
+        started(rig)
+        with pytest.raises(RigError, match="laser_1 and laser_2 did not follow the pulses"):
+            rig.read(BLOCK)
+        assert not laboratory.bench.enabled
+
+
+def test_the_counter_never_waits_for_a_laser(laboratory: Laboratory) -> None:
+    """The thread of a laser's line waits for the bench, whose locks the device holds while it starts its tasks."""
+    (laser, _) = laboratory.lasers
+    with laser._lock:  # pyright: ignore[reportPrivateUsage]
+        switched = threading.Thread(target=laser.switch, args=(np.zeros(0),), daemon=True)
+        switched.start()
+        switched.join(20.0)
+        assert not switched.is_alive()
