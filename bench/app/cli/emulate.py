@@ -1,18 +1,13 @@
 """`rockbench emulate`: serves an emulated laboratory, for test runs with the real drivers."""
 
-import signal
 import sys
-import threading
-from collections.abc import Generator
-from contextlib import contextmanager
 from pathlib import Path
-from types import FrameType
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
 from bench.app.cli.inputs import configuration_from
-from bench.app.cli.interrupt import SIGNALS
+from bench.app.cli.interrupt import until_interrupted
 from bench.app.cli.options import Handed, Seed
 from bench.app.cli.output import print_warning
 from bench.progress import silent
@@ -25,6 +20,8 @@ if TYPE_CHECKING:
     from drivers.emulation.laboratory import Laboratory
 
 
+_LOOK = 1.0
+"""Interval between two checks of the lateness of the emulation [s]."""
 LARGEST_CLOCK_ERROR = 0.01
 """Largest relative error of an emulated clock, as for the lasers of the virtual bench."""
 
@@ -35,7 +32,13 @@ def emulate(
         Path | None,
         Parameter(metavar="FILE", help="Configuration from which specimen, limits and simulation are taken."),
     ] = None,
-    lasers: Annotated[Literal["serial", "analogue"], Parameter(help="Connection of the lasers.")] = "serial",
+    lasers: Annotated[
+        Literal["serial", "socket", "analogue"] | None,
+        Parameter(
+            help="Connection of the lasers; socket is the serial line on a network port of this computer.",
+            show_default="serial; on Windows socket",
+        ),
+    ] = None,
     device: Annotated[
         Literal["usb", "crio", "cDAQ-9174", "cDAQ-9185", "cRIO-9045", "cRIO-9049", "PCIe-6351", "USB-6351"],
         Parameter(help="DAQ device: usb (USB-6363), crio (cRIO-9045 with NI 9239), or the name of another device."),
@@ -89,7 +92,7 @@ def emulate(
     """Serve an emulated laboratory: the virtual bench in real time behind the instruments' real protocols.
 
     Prints the configuration of a client, or writes it with --write, then serves the laboratory until Ctrl-C. Serial
-    lasers need pseudo-terminals, which exist on Linux and macOS only.
+    lasers need pseudo-terminals, which exist on Linux and macOS only; use --lasers socket elsewhere.
     """
     require("ni", "rockbench emulate")
     progress("loading the program")
@@ -119,16 +122,17 @@ def emulate(
         simulation.specimen or configuration.specimen,
         seed=simulation.seed,
         spring_factor=simulation.spring_factor,
-        connection=lasers,
+        connection=lasers or ("socket" if sys.platform == "win32" else "serial"),
         device=device,
         modules=modules or (),
         clock_errors=None if errors is None else ClockErrors(*errors),
     )
     try:
         laboratory.start()
-        with _until_interrupted() as over:
+        with until_interrupted() as over:
             _write_client_configuration(configuration, laboratory, write)
-            waiting.wait(over)
+            while not waiting.wait(over, _LOOK):
+                _report_lateness(laboratory)
             # closed under the same handler, so that a second Ctrl-C does not interrupt the closing
             laboratory.close()
     finally:
@@ -181,6 +185,15 @@ def _with_lead(configuration: "BenchConfiguration", lead: str | None) -> "BenchC
     return configuration.model_copy(update={"acquisition": changed})
 
 
+def _report_lateness(laboratory: "Laboratory") -> None:
+    """State delays that a client would otherwise attribute to its line."""
+    for name, delay in laboratory.late().items():
+        print_warning(
+            f"emulated laboratory: {name} sent values {delay:.2f} s late, because this computer is busy: close other "
+            "programs, or increase acquisition.lead"
+        )
+
+
 def _write_client_configuration(
     configuration: "BenchConfiguration", laboratory: "Laboratory", path: Path | None
 ) -> None:
@@ -204,24 +217,6 @@ def _write_client_configuration(
     named = path if path is not None else "FILE, once the text above is saved as FILE"
     _say(f"in another terminal: rockbench check --config {named}")
     _say("Ctrl-C closes the laboratory")
-
-
-@contextmanager
-def _until_interrupted() -> Generator[threading.Event]:
-    """Context manager that yields an event. Ctrl-C, SIGTERM and the closing of the terminal set it instead of ending
-    the process.
-    """
-    over = threading.Event()
-
-    def handle(number: int, frame: FrameType | None) -> None:  # noqa: ARG001 - the signature is Python's
-        over.set()
-
-    before = {number: signal.signal(number, handle) for number in SIGNALS}
-    try:
-        yield over
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 def _say(text: str) -> None:

@@ -239,3 +239,21 @@ def leave(code: int) -> NoReturn:
             sys.__stderr__.write("\x1b[?25h")
             sys.__stderr__.flush()
     os._exit(code)
+
+
+@contextmanager
+def until_interrupted() -> Generator[threading.Event]:
+    """Context manager that yields an event. Ctrl-C, SIGTERM and the closing of the terminal set it instead of ending
+    the process.
+    """
+    over = threading.Event()
+
+    def handle(number: int, frame: FrameType | None) -> None:  # noqa: ARG001 - the signature is Python's
+        over.set()
+
+    before = {number: signal.signal(number, handle) for number in SIGNALS}
+    try:
+        yield over
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

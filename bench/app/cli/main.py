@@ -43,6 +43,11 @@ COMMANDS = {
         "evening.json --config bench.toml --dry-run",
     ),
     "gui": ("window:gui", "Open the operator's window.", "--config bench.toml"),
+    "watch": (
+        "watch:watch",
+        "Serve a read-only live page of the run under way on this computer.",
+        "--address 0.0.0.0 --port 8000",
+    ),
     "devices": (
         "devices:devices",
         "List the NI devices with their channels and ranges, the lasers on the serial ports, and the rig backends.",

@@ -206,6 +206,10 @@ class RunOptions:
         bool, switch("Ask the operator even on the simulated bench, which otherwise performs the tasks itself.")
     ] = False
     realtime: Annotated[bool, switch("Run the simulated bench in real time instead of as fast as possible.")] = False
+    watch: Annotated[
+        bool,
+        switch("Serve a read-only live page of the run, like `rockbench watch`; the first line names its address."),
+    ] = False
     json: Annotated[
         bool,
         switch("Print one JSON object, the summary of the run or its margins, on standard output, and nothing else."),

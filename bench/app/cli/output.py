@@ -151,7 +151,12 @@ def deliver(make: Callable[[], Result], options: "ResultOptions", progress: Prog
     file is then written). Raises InvalidInput.
     """
     try:
-        _write(make(), options, progress)
+        result = make()
+        _write(result, options, progress)
+        close = result.close
+        # a file whose values are still referenced cannot be removed on Windows
+        del result
+        close()
     except InvalidInput:
         raise
     except (RockbenchError, OSError) as error:
@@ -178,7 +183,6 @@ def _write(result: Result, options: "ResultOptions", progress: Progress) -> None
 
         write_figure(options.plot, figure)
     print_result(lambda: {**result.content(), **result.metadata}, result.text, as_json=options.json)
-    result.close()
 
 
 def columns_text(table: "Table", headings: Mapping[str, str]) -> str:

@@ -3,6 +3,7 @@
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -142,7 +143,7 @@ def spectrum(request: SpectrumRequest, subject: Subject, progress: Progress) -> 
 def gain_map(request: MapRequest, subject: Subject, progress: Progress) -> Result:
     """Gain maps."""
     from bench.prediction.gain_map import grids, map_table, resting_margin
-    from bench.prediction.map_store import MapStore
+    from bench.prediction.map_store import MapStore, discard
 
     load_model(progress, STEADY)
     stores = list[MapStore]()
@@ -161,9 +162,11 @@ def gain_map(request: MapRequest, subject: Subject, progress: Progress) -> Resul
         try:
             table = map_table(subject.specimen, request, known, progress, None if subject.unfinished is None else store)
         except (KeyboardInterrupt, RockbenchError, OSError):
-            if stores and stores[0].after is not None:
-                rows = f"{stores[0].after.rows} of {len(request.beta)} rows are complete"
-                print(f"rockbench: {rows}; the same command continues the map", file=sys.stderr)
+            for each in stores:
+                if each.after is not None:
+                    rows = f"{each.after.rows} of {len(request.beta)} rows are complete"
+                    print(f"rockbench: {rows}; the same command continues the map", file=sys.stderr)
+                each.close()
             raise
         print_lost(len(request.omega) * len(request.beta) - int((table["layer"].values == "rocking").sum()))
     else:
@@ -183,7 +186,10 @@ def gain_map(request: MapRequest, subject: Subject, progress: Progress) -> Resul
         return map_figure(*axes, grid_of("rocking"), grid_of("resting"), resting_margin(subject.specimen, request))
 
     found = _result("gain maps", request, subject, table, lambda: extremes(table), figure)
-    return replace(found, close=stores[0].remove) if stores else found
+    if stores:
+        return replace(found, close=stores[0].remove)
+    # rows of an earlier, larger map with the same name
+    return found if subject.unfinished is None else replace(found, close=partial(discard, subject.unfinished))
 
 
 def _table(request: GainRequest, subject: Subject, predictions: list[GainPrediction], progress: Progress) -> Table:

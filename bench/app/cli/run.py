@@ -2,7 +2,7 @@
 
 import sys
 from collections.abc import Callable, Mapping
-from contextlib import redirect_stdout
+from contextlib import nullcontext, redirect_stdout
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,6 +12,7 @@ from cyclopts import App
 from bench.app.catalogue import CHECK, load_protocol, protocol_names
 from bench.app.cli.options import Handed, RunOptions, with_flags
 from bench.app.cli.output import Code, print_error, print_result, report_error
+from bench.app.cli.watch import PageOptions, live_page
 from bench.progress import Progress, silent
 from bench.results import SUMMARY
 from sim.errors import InvalidInput, RockbenchError, cause_of
@@ -65,17 +66,24 @@ def command_of(protocol: "Protocol[Any]") -> Callable[..., int]:
         typed: Mapping[str, Any],
         *,
         options: RunOptions = RunOptions(),  # noqa: B008 - immutable
+        page: PageOptions = PageOptions(),  # noqa: B008 - immutable
         progress: Handed = silent,
     ) -> int:
-        return _run(protocol, typed, options, progress)
+        return _run(protocol, typed, options, page, progress)
 
     command.__doc__ = f"{protocol.summary}\n\n{protocol.details}\n\n{_EXIT_CODES}"
     title = f"Parameters of the {protocol.name} protocol"
     return with_flags(protocol.parameters, title, command, protocol.positional)
 
 
-def _run(protocol: "Protocol[Any]", typed: Mapping[str, Any], options: RunOptions, progress: Progress) -> int:
+def _run(
+    protocol: "Protocol[Any]", typed: Mapping[str, Any], options: RunOptions, page: PageOptions, progress: Progress
+) -> int:
     progress("reading protocol and bench")
+    if not options.watch and page != PageOptions():
+        raise InvalidInput("--watch", None, "--address, --port and --no-token need the live page: add --watch")
+    if options.watch and (options.dry_run or options.queue is not None):
+        raise InvalidInput("--watch", True, "there is no run to show: omit it, --dry-run or --queue")
     from bench.app.cli.inputs import configuration_from, parameters_from, with_profile
     from bench.app.cli.terminal import choose
     from bench.app.folders import check_folder, default_folder, make_folder, remove_unused, result_names
@@ -103,14 +111,15 @@ def _run(protocol: "Protocol[Any]", typed: Mapping[str, Any], options: RunOption
     if options.out is None:
         out = make_folder(out)
     try:
-        ended, interrupted = carry_out(
-            protocol,
-            prepared_here,
-            out,
-            operator,
-            realtime=options.realtime,
-            about=options.about,
-        )
+        with live_page(page) if options.watch else nullcontext():
+            ended, interrupted = carry_out(
+                protocol,
+                prepared_here,
+                out,
+                operator,
+                realtime=options.realtime,
+                about=options.about,
+            )
     finally:
         if options.out is None:
             remove_unused(out)
@@ -196,6 +205,11 @@ def carry_out(
             run = Run(protocol.name, prepared.parameters, prepared.configuration, out, realtime=realtime, about=about)
             server = SessionServer(None, requests, lambda _why: None, lambda: person is not None and person.asking)
             teller = Publisher(server)
+
+            def stage(phase: str, done: int = 0, total: int = 0, /) -> None:
+                progress.prepare(phase, done, total)
+                teller.prepare(phase, done, total)
+
             last: FromSession = Refused("the run was interrupted", failed=True)
             try:
                 with announced(server, run, "terminal"):
@@ -209,7 +223,7 @@ def carry_out(
                         realtime=realtime,
                         about=about,
                         opened=lambda rig, publish: teller.opened(rig, publish, prepared),
-                        progress=progress.prepare,
+                        progress=stage,
                     )
                 last = ended_message(ended, out)
             except Exception as error:

@@ -35,7 +35,7 @@ class SessionWatch(QObject):
 
     def toggle(self) -> None:
         """Attach to the session under way elsewhere, or detach from the attached session."""
-        if self._controller.attached is not None and self._controller.running:
+        if self._controller.session.attached is not None and self._controller.running:
             self._controller.detach()
             self.look()
         elif self._controller.elsewhere is not None:

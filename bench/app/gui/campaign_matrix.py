@@ -1,98 +1,18 @@
-"""The campaign as a matrix of points, each with its state, result and expected end."""
+"""The campaign as a table of its points."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from datetime import datetime, timedelta
-from math import isfinite
+from datetime import datetime
 from typing import Any
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QBrush, QColor
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableWidget, QTableWidgetItem
 
-from bench.app.formatting import number
-from bench.app.gui import texts
-from bench.app.gui.palette import Theme
+from bench.app.display import texts
+from bench.app.display.campaign import Campaign
+from bench.app.display.theme import Theme
 from bench.app.ipc.messages import Run
 from bench.events import Event, PointFinished
-from bench.live_values import Estimate, RunningGain
-from bench.protocol import Axis, Protocol
-
-Place = tuple[int, int]
-"""Row and column of a point."""
-
-
-@dataclass
-class Cell:
-    """A point: its result as text, and its status, which is declared by the protocol or in `texts`."""
-
-    status: str = texts.POINT_WAITS
-    result: str = ""
-
-
-class Campaign:
-    """The points of a run in the order of its parameters; `rows` and `columns` are the values of the parameters."""
-
-    def __init__(self, protocol: Protocol[Any], run: Run) -> None:
-        self._axes = protocol.view.matrix
-        self._headline = protocol.view.headline
-        self.rows, self.columns = ([], []) if self._axes is None else (self._values(axis, run) for axis in self._axes)
-        self.cells: dict[Place, Cell] = {
-            (i, j): Cell() for i in range(len(self.rows)) for j in range(len(self.columns))
-        }
-        self.current: Place | None = None
-
-    @property
-    def waiting(self) -> list[Place]:
-        """Points that have not begun, in order."""
-        return [place for place, cell in self.cells.items() if cell.status == texts.POINT_WAITS]
-
-    def follow(self, event: Event) -> None:
-        """Update the points with an event."""
-        if self._axes is None:
-            return
-        match event:
-            case Estimate(omega=omega, beta=beta):
-                self._measure({"omega_rad_s": omega, "beta": beta})
-            case RunningGain(record=record, beta=beta):
-                self._measure({"record": record, "beta": beta})
-            case PointFinished():
-                point = event.point.model_dump()
-                place = self._place(point)
-                if place is not None:
-                    value = point.get(self._headline)
-                    self.cells[place] = Cell(str(point.get("status") or texts.POINT_DONE), _short(value))
-                self.current = None
-            case _:
-                pass
-
-    def expected(self, place: Place, remaining: float, now: datetime) -> datetime | None:
-        """Estimated end of a point, if the remaining points share the `remaining` time [s] equally; None if unknown."""
-        left = [*([] if self.current is None else [self.current]), *self.waiting]
-        if place not in left or not isfinite(remaining):
-            return None
-        return now + timedelta(seconds=remaining * (left.index(place) + 1) / len(left))
-
-    def _measure(self, at: Mapping[str, Any]) -> None:
-        place = self._place(at)
-        if place != self.current:
-            if self.current is not None and self.cells[self.current].status == texts.POINT_MEASURED:
-                self.cells[self.current] = Cell()
-            self.current = place
-        if place is not None:
-            self.cells[place] = Cell(texts.POINT_MEASURED)
-
-    def _place(self, point: Mapping[str, Any]) -> Place | None:
-        assert self._axes is not None
-        found = [
-            next((k for k, value in enumerate(values) if _same(value, point.get(axis.field))), None)
-            for axis, values in zip(self._axes, (self.rows, self.columns), strict=True)
-        ]
-        return None if found[0] is None or found[1] is None else (found[0], found[1])
-
-    def _values(self, axis: Axis, run: Run) -> list[object]:
-        values = getattr(run.parameters, axis.parameter)
-        return [*values] if isinstance(values, tuple) else [values]
+from bench.protocol import Protocol
 
 
 class MatrixView(QTableWidget):
@@ -151,13 +71,3 @@ class MatrixView(QTableWidget):
             item.setTextAlignment(Qt.AlignmentFlag.AlignCenter)
             item.setToolTip(" · ".join(part for part in (cell.status, cell.result, later) if part))
             self.setItem(row, column, item)
-
-
-def _short(value: object) -> str:
-    return number(value) if isinstance(value, float) else ""
-
-
-def _same(value: object, other: object) -> bool:
-    if isinstance(value, float) and isinstance(other, float | int):
-        return abs(value - other) <= 1e-9 * max(abs(value), 1.0)
-    return value == other

@@ -9,14 +9,12 @@ from PySide6.QtWidgets import (
     QTreeWidgetItem,
 )
 
+from bench.app.display import texts
+from bench.app.display.typography import typeset
 from bench.app.formatting import ABSENT, as_typed
-from bench.app.gui import texts
-from bench.app.gui.widgets import (
-    typeset,
-    unit_text,
-)
 from bench.config.declared import Declared, declared, summary
 from bench.config.model import BenchConfiguration
+from bench.document.typography import unit_text
 from sim.parameters import Parameters
 
 

@@ -4,37 +4,30 @@ It is independent of the protocols: the command line offers the same operations.
 """
 
 from collections import deque
-from collections.abc import Mapping
 from contextlib import suppress
-from math import inf
 
 from PySide6.QtCore import QObject, Qt, QTimer, Signal
 
-from bench.app.gui import texts
-from bench.app.gui.status import DRIVEN, Status, bench_status
+from bench.app.display import texts
+from bench.app.display.session_state import SessionState
+from bench.app.display.status import DRIVEN, Status
 from bench.app.ipc.client import AttachedClient, ClientConnection, SessionClient
 from bench.app.ipc.messages import (
     BEAT,
-    SILENCE,
     Attached,
-    Beat,
     Control,
     Ended,
     FromSession,
     Opened,
     PlanCheck,
     PlanChecked,
-    Preparing,
     Published,
     Question,
     Refused,
     Run,
-    SafetyInputs,
     Traces,
 )
 from bench.app.ipc.sessions import RunningSession
-from bench.app.run_display import Notice, RunDisplay
-from bench.events import State, StateChanged
 from drivers.clock import now
 
 PERIOD = 28
@@ -79,29 +72,13 @@ class Controller(QObject):
         self._plan_checks: dict[object, SessionClient] = {}
         self._waiting = deque[FromSession]()
         self._running = False
-        self._question: Question | None = None
-        self._spoken = self._started = 0.0
-        self._stopped_at: float | None = None
-        self.scene = RunDisplay()
-        self.inputs: Mapping[str, bool] = {}
-        self._inputs_received: float | None = None
-        self.driven = False
-        """Whether the rig was armed in the current or last run."""
-        self.run: Run | None = None
-        """The current or last run; None before the first run, and until an attached session has sent its description.
-        """
-        self.attached: RunningSession | None = None
-        """The session of another window, or of a terminal, whose current or last run is shown."""
-        self.controls = True
-        """Whether this window controls the run, that is, may answer questions and ramp out. STOP is always effective.
-        """
+        self._spoken = 0.0
+        self.session = SessionState()
+        """State of the current or last run."""
         self.elsewhere: RunningSession | None = None
         """A session under way on this computer to which this window is not attached."""
         self.held = ""
         """Reason why only the queue may start a run; empty if there is none."""
-        self.lost = (0, 0)
-        self._quiet, self._longest_quiet = 0.0, inf
-        self._failure = ""
         self.latched = False
         """Whether STOP was pressed and not cleared since."""
         self._pressed_at = 0.0
@@ -128,57 +105,29 @@ class Controller(QObject):
         """Text that states whose run is shown and what this window may do; empty without a run."""
         if not self._running:
             return ""
-        if self.attached is not None:
-            owner = texts.OWNERS.get(self.attached.owner, self.attached.owner)
-            right = texts.ATTACHED_CONTROLS if self.controls else texts.ATTACHED_READ_ONLY.format(owner=owner)
-            return f"{texts.ATTACHED_RUN.format(owner=owner.capitalize(), run=self.attached.title)} {right}"
-        run = self.run
+        attached, run = self.session.attached, self.session.run
+        if attached is not None:
+            owner = texts.OWNERS.get(attached.owner, attached.owner)
+            right = texts.ATTACHED_CONTROLS if self.session.controls else texts.ATTACHED_READ_ONLY.format(owner=owner)
+            return f"{texts.ATTACHED_RUN.format(owner=owner.capitalize(), run=attached.title)} {right}"
         by = run.about.get("operator", "") if run is not None else ""
         told = "" if run is None else f"{run.protocol}{f' by {by}' if by else ''}, {run.out}"
         return texts.OWN_RUN.format(run=told)
 
     @property
-    def inputs_age(self) -> float | None:
-        """Time since the last message on the safety inputs of the current run [s]; None before the first."""
-        if not self._running or self._inputs_received is None:
-            return None
-        return now() - self._inputs_received
-
-    @property
     def armed(self) -> bool:
         """Whether the rig is armed, or its state is unknown."""
-        return self._running and (self.scene.state in DRIVEN or self.status.level == "alarm")
-
-    @property
-    def elapsed(self) -> float:
-        """Wall-clock time since the run was started [s]."""
-        if not self._started:
-            return 0.0
-        return (self._stopped_at or now()) - self._started
+        return self._running and (self.session.scene.state in DRIVEN or self.status.level == "alarm")
 
     @property
     def status(self) -> Status:
         """Status shown in the header."""
-        link, scene = self._link if self._running else None, self.scene
-        if self._failure:
-            return Status(texts.FAILED_WORD, self._failure, "alarm", "cross")
-        if link is None and self.elsewhere is not None:
+        link = self._link if self._running else None
+        if link is not None:
+            return self.session.status(link.status, link.silence, lives=link.lives)
+        if self.elsewhere is not None and not self.session.failed:
             return Status(texts.RUN_ELSEWHERE, texts.ELSEWHERE.format(run=self.elsewhere.title), "wait", "ring")
-        if link is None:
-            return bench_status("over" if self._started else "none", scene.state, scene.reason, 0.0)
-        if link.status == "starting" and self.attached is not None:
-            return Status(texts.ATTACHING, texts.ATTACHING_WHY.format(run=self.attached.title), "wait", "ring")
-        if link.status == "linked" and scene.state in DRIVEN and self._quiet > self._longest_quiet:
-            # the process runs but its engine does not respond: the last known state may be outdated
-            return bench_status("no link", scene.state, scene.reason, self._quiet)
-        planning = scene.preparing and scene.state is State.IDLE
-        if planning and (link.status == "linked" or (link.status == "no link" and link.lives)):
-            # no rig is open: a busy computer may delay the messages of a process that plans
-            late = "" if link.status == "linked" else f" ({texts.PLANNING_LATE.format(age=link.silence)})"
-            return Status(texts.PLANNING, f"{scene.reason}{late}", "wait", "ring")
-        # the reason for the change of state no longer applies once the plan continues
-        reason = scene.step if scene.state is State.RUNNING and scene.step else scene.reason
-        return bench_status(link.status, scene.state, reason, link.silence)
+        return self.session.status(None)
 
     def check_plan(self, plan: PlanCheck, by: object) -> None:
         """Request a plan check, also while a run is under way; `plan_checked` emits the result. A new request replaces
@@ -197,7 +146,8 @@ class Controller(QObject):
         if self._running or self.latched:
             return
         self._use(SessionClient(run, self._call), None)
-        self._set_run(run, 0.0)
+        self.session.begin(run)
+        self._begin(run)
 
     def attach(self, session: RunningSession) -> None:
         """Attach to a session that another window or a terminal has started, and show its run, which this window can
@@ -211,27 +161,18 @@ class Controller(QObject):
     def detach(self) -> None:
         """Detach from a session; its run is not affected."""
         link = self._link
-        if link is not None and self.attached is not None:
-            self._link, self._running, self._started, self._question = None, False, 0.0, None
-            self.scene, self.attached, self.latched = RunDisplay(), None, False
+        if link is not None and self.session.attached is not None:
+            self._link, self._running, self.session, self.latched = None, False, SessionState(), False
             link.leave()
             self.question_changed.emit(None)
             self.changed.emit()
 
     def _use(self, link: ClientConnection, attached: RunningSession | None) -> None:
-        self.scene, self.inputs, self.lost, self._failure = RunDisplay(), {}, (0, 0), ""
-        self._inputs_received, self.driven = None, False
+        self.session, self.elsewhere = SessionState(attached), None
         self._waiting.clear()
-        self._quiet, self._longest_quiet = 0.0, inf
-        self.run, self.attached, self.controls, self.elsewhere = None, attached, attached is None, None
         self._link, self._running = link, True
-        self._started, self._stopped_at = now(), None
 
-    def _set_run(self, run: Run, elapsed: float) -> None:
-        # a simulated bench that does not run in real time may be silent while the model computes
-        paced = run.realtime or run.configuration.real_time_only
-        self._longest_quiet = SILENCE + run.configuration.acquisition.block_duration if paced else inf
-        self.run, self._started = run, now() - elapsed
+    def _begin(self, run: Run) -> None:
         self.began.emit(run)
         self.changed.emit()
 
@@ -254,20 +195,22 @@ class Controller(QObject):
 
     def ramp_out(self) -> None:
         """Request a gentle ramp-out, which ends the run."""
-        if self._link is not None and self.controls:
+        if self._link is not None and self.session.controls:
             self._link.ask("stop")
 
     def note(self, text: str) -> None:
         """Add a note to the log and to the data file of the run."""
         if self._link is not None and text.strip():
-            by = "" if self.run is None else self.run.about.get("operator", "")
+            run = self.session.run
+            by = "" if run is None else run.about.get("operator", "")
             self._link.note(text.strip(), by or texts.UNNAMED)
 
     def answer(self, *, agreed: bool) -> None:
         """Answer the open question."""
-        if self._link is not None and self._question is not None and self.controls:
-            self._link.answer(self._question.number, agreed=agreed)
-            self._question = None
+        session = self.session
+        if self._link is not None and session.question is not None and session.controls:
+            self._link.answer(session.question.number, agreed=agreed)
+            session.question = None
             self.question_changed.emit(None)
 
     def close(self) -> None:
@@ -333,58 +276,26 @@ class Controller(QObject):
             self.changed.emit()
 
     def _take(self, message: FromSession) -> None:
+        session, question = self.session, self.session.question
+        notice = session.follow(message)
         match message:
             case Published(event):
-                notice = self.scene.update(event)
                 self.event_received.emit(event)
                 if notice is not None:
                     self.noticed.emit(notice)
-                if isinstance(event, StateChanged):
-                    self._entered(event.after)
-            case Beat():
-                # correct even if the event with the change of state was lost
-                self.scene.state, self.scene.time = message.state, message.time
-                if not self.scene.preparing:
-                    self.scene.reason = message.reason
-                self.driven = self.driven or message.state in DRIVEN
-                self.lost, self._quiet = (message.lost_events, message.lost_traces), message.quiet
-            case Preparing():
-                self.scene.prepare(message.phase, message.done, message.total)
+                if question is not None and session.question is None:
+                    self.question_changed.emit(None)
             case Attached():
-                self._set_run(message.run, message.elapsed)
+                self._begin(message.run)
             case Control():
-                self.controls = message.granted
-                self.question_changed.emit(self._question if message.granted else None)
-            case Opened():
-                self.scene.expect(message.duration)
+                self.question_changed.emit(session.question if message.granted else None)
             case Question():
-                self._question = message
-                if self.controls:
+                if session.controls:
                     self.question_changed.emit(message)
-            case SafetyInputs():
-                self.inputs, self._inputs_received = message.good, now()
-            case Ended():
-                self._finish_run(message, Notice(self.scene.time, "end", f"{message.status}: {message.reason}"))
-            case Refused():
-                self._finish_run(message, Notice(self.scene.time, "end", message.text, grave=True))
+            case Ended() | Refused():
+                self._link, self._running = None, False
+                self.question_changed.emit(None)
+                self.noticed.emit(notice)
+                self.ended.emit(message)
             case _:
                 pass
-
-    def _entered(self, state: State) -> None:
-        self.driven = self.driven or state in DRIVEN
-        if state is not State.WAITING and self._question is not None:
-            self._question = None
-            self.question_changed.emit(None)
-
-    def _finish_run(self, message: Ended | Refused, notice: Notice) -> None:
-        self._link, self._running, self._question = None, False, None
-        self._stopped_at = now()
-        if isinstance(message, Ended):
-            self.scene.preparing, self.scene.reason = False, message.reason
-        else:
-            self.scene.state = State.CLOSED
-            self.scene.reason = message.text
-            self._failure = texts.FAILED.format(text=message.text) if message.failed else ""
-        self.question_changed.emit(None)
-        self.noticed.emit(notice)
-        self.ended.emit(message)

@@ -7,14 +7,16 @@ from typing import Any
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QCheckBox, QComboBox, QFormLayout, QLabel, QLineEdit, QVBoxLayout, QWidget
 
+from bench.app.display import texts
+from bench.app.display.typography import label, typeset
 from bench.app.formatting import as_typed
-from bench.app.gui import texts
-from bench.app.gui.widgets import ignore_wheel, label, set_level, typeset, unit_text
+from bench.app.gui.widgets import ignore_wheel, set_level
 from bench.app.ipc.messages import PlanCheck, Run
 from bench.app.queue.queue import Queued
 from bench.config.declared import Declared, declared
 from bench.config.model import BenchConfiguration
 from bench.config.validation import problems, read_fields, validated
+from bench.document.typography import unit_text
 from sim.parameters import Parameters
 
 Field = QLineEdit | QComboBox | QCheckBox

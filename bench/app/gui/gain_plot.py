@@ -11,9 +11,9 @@ import pyqtgraph as pg
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor
 
-from bench.app.gui import texts
-from bench.app.gui.gains import LEAST, Kind, Line, Mark, kind_of, lines_of, mark_of
-from bench.app.gui.palette import Theme
+from bench.app.display import texts
+from bench.app.display.gains import LEAST, Kind, Line, Mark, kind_of, lines_of, mark_of
+from bench.app.display.theme import Theme
 from bench.app.gui.widgets import colour_axes, round_down
 from bench.datafile.tables import Table
 from bench.live_values import Estimate, RunningGain

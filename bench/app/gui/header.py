@@ -17,11 +17,13 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from bench.app.display import texts
+from bench.app.display.session_state import STALE
+from bench.app.display.theme import Theme
+from bench.app.display.typography import typeset
 from bench.app.formatting import clock
-from bench.app.gui import texts
 from bench.app.gui.controller import DELIBERATE, Controller
-from bench.app.gui.palette import Theme
-from bench.app.gui.widgets import ElidingLabel, Lamp, give_key, set_level, typeset
+from bench.app.gui.widgets import ElidingLabel, Lamp, give_key, set_level
 
 KEY = Qt.Key.Key_F12
 
@@ -85,8 +87,6 @@ class StopFilter(QObject):
         return True
 
 
-STALE = 2.0
-"""Age above which the safety inputs are unknown [s]."""
 HEIGHT, LOW = 96, 72
 """Side of the lamp, height of the header, and its height in a small window [px]. The height is fixed, so that text
 never moves STOP.
@@ -172,7 +172,7 @@ class Header(QWidget):
 
     def refresh(self) -> None:
         """Show the current state."""
-        controller, scene = self._controller, self._controller.scene
+        controller, scene = self._controller, self._controller.session.scene
         shown = controller.status
         self.lamp.show_as(shown.shape, shown.level, on_red=controller.latched)
         self.word.setText(shown.word)
@@ -181,7 +181,7 @@ class Header(QWidget):
         # a high header shows the step in a separate field
         reason = "" if shown.reason == scene.step and self.details.isVisibleTo(self) else shown.reason
         said = ([texts.STOPPED + "."] if controller.latched else []) + [typeset(reason)]
-        if controller.attached is not None and controller.running:
+        if controller.session.attached is not None and controller.running:
             # the owner of the run has priority over the rest of the reason
             said.insert(0, controller.owner)
         if not key_acts:
@@ -189,7 +189,7 @@ class Header(QWidget):
         self.reason.setText(" ".join(said))
         self.reason.setToolTip(self.reason.text())
         _set_property(self, "latched", "yes" if controller.latched else "no")
-        self.elapsed.setText(clock(controller.elapsed))
+        self.elapsed.setText(clock(controller.session.elapsed))
         self.remaining.setText(clock(scene.time_left if controller.running else float("nan")))
         now = (scene.step, scene.activity) if controller.running else ()
         step = " · ".join(typeset(part) for part in now if part)
@@ -210,28 +210,15 @@ class Header(QWidget):
     def _show_owner(self) -> None:
         controller = self._controller
         self.owner.setText(controller.owner or "–")
-        attached = controller.attached is not None and controller.running
+        attached = controller.session.attached is not None and controller.running
         self.attach.setVisible(attached or (controller.elsewhere is not None and not controller.running))
         self.attach.setText(texts.DETACH if attached else texts.ATTACH)
         self.attach.setToolTip(texts.DETACH_TIP if attached else texts.ATTACH_TIP)
 
     def _show_inputs(self) -> None:
-        """Show the safety inputs; values older than `STALE` are shown as unknown."""
-        controller = self._controller
-        age, wired = controller.inputs_age, controller.inputs
-        known = age is not None and age <= STALE
-        if not controller.running:
-            text = texts.INPUTS_UNREAD
-        elif age is not None and not wired:
-            text = texts.NO_INPUTS
-        elif known:
-            words = (texts.INPUT_OPEN, texts.INPUT_GOOD)
-            text = ", ".join(f"{name} {words[good]}" for name, good in wired.items())
-        else:
-            text = ", ".join(f"{name} {texts.INPUT_UNKNOWN}" for name in wired) or texts.INPUT_UNKNOWN
+        text, level = self._controller.session.inputs_line(running=self._controller.running)
         self.inputs.setText(text)
-        unknown = controller.running and not known and (bool(wired) or age is None)
-        set_level(self.inputs, "wait" if unknown else "calm" if all(wired.values()) or not known else "alarm")
+        set_level(self.inputs, level)
 
 
 def application() -> QApplication:

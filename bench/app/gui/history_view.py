@@ -19,11 +19,12 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from bench.app.gui import texts
+from bench.app.display import texts
+from bench.app.display.theme import Theme
+from bench.app.display.typography import in_screen_unit, label
 from bench.app.gui.background import Reader
 from bench.app.gui.open_files import DRIVE, RunFile
-from bench.app.gui.palette import Theme
-from bench.app.gui.widgets import colour_axes, in_screen_unit, label
+from bench.app.gui.widgets import colour_axes
 from bench.app.ipc.messages import extremes
 
 CHUNK = 1_000_000

@@ -2,25 +2,19 @@
 # pyright: reportMissingTypeStubs=false
 """The live plot of protocols without a gain: the last fit with its data, or the last response of the table."""
 
-from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import Qt
 
-from bench.app.gui import texts
-from bench.app.gui.palette import Theme
-from bench.app.gui.widgets import colour_axes, in_screen_unit, label, typeset
-from bench.findings import FitFinished, Series, TableIdentified
+from bench.app.display import texts
+from bench.app.display.figure import figure_of
+from bench.app.display.theme import Theme
+from bench.app.gui.widgets import colour_axes
+from bench.findings import FitFinished, TableIdentified
 
-MOST = 6
-"""Largest number of drawn series."""
 FEW = 40
 """Largest number of values drawn with symbols."""
-DERIVED = ("residual", "uncertainty")
-"""Suffixes of the names of series that are not drawn."""
-FITTED = "fitted"
 
 
 class LivePlot(pg.PlotWidget):
@@ -36,7 +30,7 @@ class LivePlot(pg.PlotWidget):
         self._item.setMenuEnabled(False)
         self._legend = self._item.addLegend(offset=(-8, 8), labelTextSize="9pt")
         self.drawn: list[str] = []
-        """Names of the drawn series."""
+        """Names of the drawn curves."""
         self.use_theme(theme)
 
     def use_theme(self, theme: Theme) -> None:
@@ -61,45 +55,17 @@ class LivePlot(pg.PlotWidget):
     def show_result(self, event: FitFinished | TableIdentified) -> None:
         """Draw a finished fit, or the response of the table."""
         self.forget()
-        self._shown = event
-        if isinstance(event, FitFinished):
-            self._draw(event.columns)
-            self._item.setTitle(typeset(event.name), color=self._theme.text, size="10pt", justify="left")
-        else:
-            size = Series(np.hypot(event.real, event.imaginary), "m/s2/V", texts.RESPONSE)
-            self._draw({"frequency": Series(event.frequency, "Hz", ""), texts.RESPONSE: size})
-
-    def _draw(self, columns: Mapping[str, Series]) -> None:
-        (axis, along), *others = columns.items()
-        if not others:
-            return
-        first = others[0][1].unit
-        chosen = [
-            (name, series)
-            for name, series in others
-            if series.unit == first and not name.endswith(DERIVED) and np.isfinite(series.values).any()
-        ]
-        x, unit = in_screen_unit(along.unit)
-        self._item.setLabel("bottom", _with_unit(axis, unit), color=self._theme.text)
-        y, unit = in_screen_unit(first)
-        for number, (name, series) in enumerate(chosen[:MOST]):
+        self._shown, figure = event, figure_of(event)
+        if figure.title:
+            self._item.setTitle(figure.title, color=self._theme.text, size="10pt", justify="left")
+        self._item.setLabel("bottom", figure.x_label, color=self._theme.text)
+        self._item.setLabel("left", figure.y_label, color=self._theme.text)
+        for number, curve in enumerate(figure.curves):
             colour = self._theme.lines[number % len(self._theme.lines)]
-            dash = Qt.PenStyle.DashLine if name.endswith(FITTED) else Qt.PenStyle.SolidLine
-            few = len(series.values) <= FEW
+            style = Qt.PenStyle.DashLine if curve.fitted else Qt.PenStyle.SolidLine
+            few = len(curve.y) <= FEW
             symbol = {"symbol": "o", "symbolSize": 7, "symbolBrush": colour, "symbolPen": colour} if few else {}
-            self.plot(
-                x * along.values,
-                y * series.values,
-                pen=pg.mkPen(colour, width=2 if dash is Qt.PenStyle.DashLine else 1, style=dash),
-                name=label(name),
-                connect="finite",
-                **symbol,
-            )
-            self.drawn.append(name)
-        names = [label(name) for name in self.drawn]
-        self._item.setLabel("left", _with_unit(names[0] if len(names) == 1 else "", unit), color=self._theme.text)
+            pen = pg.mkPen(colour, width=2 if curve.fitted else 1, style=style)
+            self.plot(curve.x, curve.y, pen=pen, name=curve.name, connect="finite", **symbol)
+            self.drawn.append(curve.name)
         self._item.enableAutoRange()
-
-
-def _with_unit(name: str, unit: str) -> str:
-    return " ".join(part for part in (label(name), f"[{unit}]" if unit not in ("", "1") else "") if part)

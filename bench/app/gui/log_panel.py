@@ -6,10 +6,10 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QKeySequence, QShortcut
 from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QPlainTextEdit, QPushButton, QVBoxLayout, QWidget
 
+from bench.app.display import texts
+from bench.app.display.typography import typeset
 from bench.app.formatting import clock
-from bench.app.gui import texts
 from bench.app.gui.controller import Controller
-from bench.app.gui.widgets import typeset
 from bench.app.run_display import Notice
 
 LOG_LINES = 2000

@@ -9,9 +9,9 @@ import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
 
-from bench.app.gui import texts
-from bench.app.gui.buffers import Ring
-from bench.app.gui.palette import Theme
+from bench.app.display import texts
+from bench.app.display.buffers import Ring
+from bench.app.display.theme import Theme
 from bench.app.gui.widgets import colour_axes
 from bench.app.ipc.messages import TRACES
 from bench.live_values import TWIN_TRACE, TwinEstimate

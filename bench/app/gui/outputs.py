@@ -10,8 +10,8 @@ from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QPushButton, QSizePolicy, QWidget
 
 from bench.app.catalogue import format_names
+from bench.app.display import texts
 from bench.app.export.format import load_format
-from bench.app.gui import texts
 from bench.app.gui.background import Command
 from bench.app.gui.widgets import set_level
 from sim.errors import InvalidInput

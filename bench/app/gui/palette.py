@@ -1,40 +1,15 @@
-"""Colours after Okabe and Ito, for a light and a dark desktop, and the style of the widgets."""
-
-from dataclasses import dataclass
+"""The style of the widgets, for a light and a dark desktop."""
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor, QGuiApplication, QPalette
 from PySide6.QtWidgets import QApplication
 
+from bench.app.display.theme import DARK, LIGHT, Theme
+
 BASE, SMALL, VALUE, BANNER = 11, 14, 20, 26
 """Font sizes [pt] of text, of STOP in a small window, of live values, and of the bench's state, which is readable at
 two metres.
 """
-
-
-@dataclass(frozen=True)
-class Theme:
-    """Colours as #rrggbb; `lines` are those of curves, with enough contrast on `ground`."""
-
-    ground: str
-    raised: str
-    text: str
-    faint: str
-    calm: str
-    good: str
-    wait: str
-    alarm: str
-    lines: tuple[str, ...]
-
-
-LIGHT = Theme(
-    *("#efefef", "#ffffff", "#000000", "#5a5a5a", "#5a5a5a", "#00694d", "#0072B2", "#b34700"),
-    lines=("#000000", "#0072B2", "#b34700", "#00694d", "#8a4a70"),
-)
-DARK = Theme(
-    *("#1e1e1e", "#2a2a2a", "#f0f0f0", "#a8a8a8", "#a8a8a8", "#00AB7D", "#56B4E9", "#E69F00"),
-    lines=("#f0f0f0", "#56B4E9", "#E69F00", "#F0E442", "#CC79A7"),
-)
 
 
 def desktop_theme() -> Theme:

@@ -6,9 +6,10 @@ from PySide6.QtCore import QEvent, QObject, Qt, QTimer
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QPushButton, QScrollArea, QVBoxLayout, QWidget
 
-from bench.app.gui import texts
+from bench.app.display import texts
+from bench.app.display.typography import typeset
 from bench.app.gui.controller import Controller
-from bench.app.gui.widgets import give_key, set_level, typeset
+from bench.app.gui.widgets import give_key, set_level
 from bench.app.ipc.messages import Ended, PlanChecked, Question
 from bench.events import Event, OperatorAsked, PointFinished
 from drivers.rig import OperatorTask

@@ -14,9 +14,10 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from bench.app.display import texts
+from bench.app.display.typography import in_screen_unit, label, typeset
 from bench.app.formatting import ABSENT, clock
-from bench.app.gui import texts
-from bench.app.gui.widgets import in_screen_unit, label, set_level, typeset
+from bench.app.gui.widgets import set_level
 from bench.app.ipc.messages import PlanChecked
 from bench.preflight.margins import Margin
 

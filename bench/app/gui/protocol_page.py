@@ -10,8 +10,8 @@ from typing import Any, cast
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QComboBox, QHBoxLayout, QPushButton, QScrollArea, QSplitter, QVBoxLayout, QWidget
 
+from bench.app.display import texts
 from bench.app.folders import check_folder, default_folder, make_folder, remove_unused, result_names
-from bench.app.gui import texts
 from bench.app.gui.controller import Controller
 from bench.app.gui.form import Form, RunOptions
 from bench.app.gui.plan_view import PlanView

@@ -18,13 +18,15 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from bench.app.display import texts
+from bench.app.display.typography import label
 from bench.app.formatting import ABSENT, as_typed
-from bench.app.gui import texts
 from bench.app.gui.controller import Controller
 from bench.app.gui.queue_runner import QueueRunner
-from bench.app.gui.widgets import FITTING, give_key, label, scrolling, set_level, unit_text
+from bench.app.gui.widgets import FITTING, give_key, scrolling, set_level
 from bench.app.queue.queue import MOST_COPIES, OPEN, Queued, Stage
 from bench.config.declared import Declared, declared
+from bench.document.typography import unit_text
 from bench.protocol import Protocol
 
 LOWEST = 150

@@ -5,11 +5,11 @@ from datetime import datetime
 
 from PySide6.QtCore import QObject, QTimer, Signal
 
+from bench.app.display import texts
+from bench.app.display.trouble import Trouble
 from bench.app.folders import remove_unused
-from bench.app.gui import texts
 from bench.app.gui.controller import Controller
 from bench.app.gui.queue_check import Checked, QueueCheck
-from bench.app.gui.trouble import Trouble
 from bench.app.ipc.messages import Ended, Refused, Run
 from bench.app.queue.file import Owner, QueueFile
 from bench.app.queue.queue import Queue, Queued, Stage, own_folder

@@ -21,26 +21,19 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from bench.app.display import texts
+from bench.app.display.gains import Difference, compare, kind_of
+from bench.app.display.point_table import every_field, rows_of
+from bench.app.display.theme import Theme
+from bench.app.display.typography import typeset
 from bench.app.formatting import ABSENT, number
-from bench.app.gui import texts
 from bench.app.gui.controller import Controller
 from bench.app.gui.figure_view import FigureView
 from bench.app.gui.gain_plot import GainPlot
-from bench.app.gui.gains import Difference, compare, kind_of
 from bench.app.gui.history_view import HistoryView
 from bench.app.gui.open_files import FileList, Place, read_file
 from bench.app.gui.outputs import Outputs
-from bench.app.gui.palette import Theme
-from bench.app.gui.point_table import every_field, rows_of
-from bench.app.gui.widgets import (
-    FITTING,
-    ask_for_files,
-    give_key,
-    scrolling,
-    set_level,
-    typeset,
-    why_no_dialog,
-)
+from bench.app.gui.widgets import FITTING, ask_for_files, give_key, scrolling, set_level, why_no_dialog
 from bench.app.ipc.messages import Ended, Refused
 from bench.datafile.tables import Column
 from bench.results import FILE

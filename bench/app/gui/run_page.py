@@ -1,7 +1,5 @@
 """The Run page: meters of the limits, verdict, the protocol's plot, picture, traces, points and log."""
 
-from typing import Any
-
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import (
@@ -14,11 +12,12 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from bench.analysis.uncertainty import COVERAGE
-from bench.app.catalogue import load_protocol
-from bench.app.formatting import ABSENT, clock, measurement
-from bench.app.gui import texts
-from bench.app.gui.buffers import BlockAngle
+from bench.app.display import texts
+from bench.app.display.buffers import BlockAngle
+from bench.app.display.run_contents import RunContents
+from bench.app.display.theme import Theme
+from bench.app.display.typography import typeset
+from bench.app.formatting import ABSENT, clock
 from bench.app.gui.campaign_matrix import MatrixView
 from bench.app.gui.controller import PERIOD, Controller
 from bench.app.gui.gain_plot import GainPlot
@@ -26,28 +25,16 @@ from bench.app.gui.live_plot import LivePlot
 from bench.app.gui.log_panel import LogPanel
 from bench.app.gui.meters import MetersView
 from bench.app.gui.motion_plot import KINDS, MotionPlot
-from bench.app.gui.palette import Theme
 from bench.app.gui.picture import PhysicalPicture
-from bench.app.gui.status import Arrangement
 from bench.app.gui.steadiness import SteadyView
 from bench.app.gui.traces import TracePlot
-from bench.app.gui.verdict import VerdictLabel, running_verdict, verdict_of
-from bench.app.gui.widgets import (
-    FITTING,
-    ElidingLabel,
-    give_key,
-    in_screen_unit,
-    label,
-    scrolling,
-    set_level,
-    typeset,
-)
+from bench.app.gui.verdict import VerdictLabel
+from bench.app.gui.widgets import FITTING, ElidingLabel, give_key, scrolling, set_level
 from bench.app.ipc.messages import Opened, Run, Traces
 from bench.datafile.tables import Table
-from bench.events import Event, PointFinished, SpecimenMounted, StepStarted
+from bench.events import Event, PointFinished, StepStarted
 from bench.findings import FitFinished, TableIdentified
-from bench.live_values import Estimate, LiveValue, RunningGain, TwinEstimate
-from bench.protocol import Protocol
+from bench.live_values import Estimate, RunningGain, TwinEstimate
 
 GAINS_HEIGHT, LOWEST = 150, 540
 """Minimum heights [px] of the protocol's plot, for a readable axis, and of the page, for a complete picture."""
@@ -68,15 +55,13 @@ class RunPage(QWidget):
         self.live, self.shown_plot = LivePlot(theme), QStackedWidget()
         for plot in (self.gains, self.live):
             self.shown_plot.addWidget(plot)
-        self._protocol: Protocol[Any] | None = None
-        self._has_live_value = False
+        self.contents = RunContents()
         self.picture, self.block = PhysicalPicture(theme), BlockAngle()
-        self.arrangement = Arrangement()
         self.meters, self.matrix = MetersView(theme), MatrixView(theme)
         self.panel = LogPanel(controller)
         self.log = self.panel.text
         self.point, self.verdict = ElidingLabel(), VerdictLabel()
-        self.verdict.show_sentence(texts.NO_GAIN)
+        self.verdict.show_sentence(self.contents.sentence)
         # always one line, so that they neither widen the page nor move the content below
         self.lost, self.twin = ElidingLabel(), ElidingLabel()
         self.ramp_out = QPushButton(texts.RAMP_OUT)
@@ -163,28 +148,26 @@ class RunPage(QWidget):
         for plot in self.motion:
             plot.forget()
         self.panel.clear()
-        protocol = self._protocol = load_protocol(run.protocol)
-        has_gain = "alpha_2" in protocol.point.model_fields
+        contents = self.contents = RunContents(run)
         self.live.forget()
-        self.shown_plot.setCurrentWidget(self.gains if has_gain else self.live)
+        self.shown_plot.setCurrentWidget(self.gains if contents.has_gain else self.live)
         # without a gain there is nothing to draw before the first result
-        self.shown_plot.setVisible(has_gain)
-        self._has_live_value = False
-        self._show_point("")
-        self.verdict.show_sentence(texts.NO_GAIN if has_gain else texts.NO_RESULT)
-        self.arrangement = Arrangement()
+        self.shown_plot.setVisible(contents.has_gain)
+        self.point.setText("")
+        self.verdict.show_sentence(contents.sentence)
         self.picture.use(run.configuration.known_specimen)
         self.traces.watch_block(None)
         self.steady.begin(run)
         self.block = BlockAngle()
         self.meters.use(run.configuration)
-        self.matrix.begin(protocol, run)
+        if contents.protocol is not None:
+            self.matrix.begin(contents.protocol, run)
 
     def _open(self, opened: Opened) -> None:
         self.traces.use_further(opened.further)
-        if self._controller.run is not None and opened.margins:
-            self.meters.use(self._controller.run.configuration, opened.margins)
-        if self._controller.attached is not None:
+        if self._controller.session.run is not None and opened.margins:
+            self.meters.use(self._controller.session.run.configuration, opened.margins)
+        if self._controller.session.attached is not None:
             self.gains.predict(opened.prediction)
 
     def _trace(self, traces: list[Traces]) -> None:
@@ -209,30 +192,29 @@ class RunPage(QWidget):
         self.meters.show_live(live=self.traces.stale is None and self._controller.running)
 
     def _tell(self, event: Event) -> None:
-        self.matrix.follow(event, self._controller.scene.time_left)
+        self.matrix.follow(event, self._controller.session.scene.time_left)
+        contents = self.contents
+        contents.follow(event)
+        self.point.setText(contents.point)
+        self.verdict.show_sentence(contents.sentence)
+        if contents.arrangement != self.picture.canvas.arrangement:
+            self.picture.show_arrangement(contents.arrangement)
+            self.traces.watch_block(contents.arrangement.face)
         match event:
             case Estimate():
-                self._show_point(texts.MEASURING.format(point=_sine(event.omega, event.beta)))
-                self.verdict.show_sentence(running_verdict(event))
                 self.gains.show_running(event)
                 self.steady.point(event.omega, event.beta)
                 for plot in self.motion:
                     plot.omega = event.omega
-                self._couple(event.beta)
             case RunningGain():
-                self._show_point(texts.MEASURING.format(point=_record_point_name(event.record, event.beta)))
-                self.verdict.show_sentence(running_verdict(event))
                 self.gains.show_running(event)
-                self._couple(event.beta)
-            case LiveValue():
-                self._has_live_value = True
-                self.verdict.show_sentence(running_verdict(event))
-            case PointFinished():
-                self._finish(event)
-            case FitFinished() | TableIdentified() if self.shown_plot.currentWidget() is self.live:
+            case PointFinished() if "alpha_2" in type(event.point).model_fields:
+                self.shown_plot.setCurrentWidget(self.gains)
+                self.shown_plot.show()
+                self.gains.add(event.point.model_dump())
+            case FitFinished() | TableIdentified() if event is contents.result:
                 self.shown_plot.show()
                 self.live.show_result(event)
-                self._show_result(event)
             case StepStarted():
                 self.steady.finish()
                 for plot in self.motion:
@@ -241,59 +223,11 @@ class RunPage(QWidget):
                 self.block.add(event)
                 for plot in self.motion:
                     plot.add(event)
-            case SpecimenMounted():
-                self.arrangement.follow(event)
-                self.picture.show_arrangement(self.arrangement)
-                self.traces.watch_block(self.arrangement.face)
             case _:
                 pass
 
-    def _finish(self, event: PointFinished) -> None:
-        """Show the result of a point, with the same uncertainty as in the log and the data file."""
-        point, protocol = event.point.model_dump(), self._protocol
-        if protocol is None:
-            return
-        if protocol.log_line is not None:
-            self.verdict.show_sentence(typeset(protocol.log_line(event.point)))
-        elif protocol.view.headline or not self._has_live_value:
-            # for a protocol without a headline, the live value is the verdict
-            self.verdict.show_sentence(verdict_of(protocol.view, event.point))
-        if "alpha_2" not in point:
-            return
-        self.shown_plot.setCurrentWidget(self.gains)
-        self.shown_plot.show()
-        self.gains.add(point)
-        omega, beta = point.get("omega_rad_s"), point.get("beta")
-        where = (
-            _record_point_name(point["record"], beta)
-            if "record" in point
-            else ""
-            if omega is None
-            else _sine(omega, beta)
-        )
-        self._show_point(texts.LAST_POINT.format(status=point.get("status", ""), point=where))
-
-    def _show_result(self, event: FitFinished | TableIdentified) -> None:
-        if isinstance(event, FitFinished) and event.parameters:
-            name, found = next(iter(event.parameters.items()))
-            factor, unit = in_screen_unit(found.unit)
-            value = measurement(factor * found.value, COVERAGE * factor * found.uncertainty, unit)
-            self.verdict.show_sentence(f"{label(name)} {value}")
-            self._show_point(f"{typeset(event.name)}: {typeset(event.text)}")
-        else:
-            self._show_point(typeset(event.text))
-
-    def _show_point(self, text: str) -> None:
-        self.point.setText(text)
-
-    def _couple(self, beta: float | None) -> None:
-        coupled = beta is not None
-        if coupled != self.arrangement.spring:
-            self.arrangement.block = self.arrangement.spring = coupled
-            self.picture.show_arrangement(self.arrangement)
-
     def _refresh(self) -> None:
-        events, traces = self._controller.lost
+        events, traces = self._controller.session.lost
         lost = [text.format(n=n) for n, text in zip((events, traces), texts.LOST_PARTS, strict=True) if n]
         said = [texts.LOST.format(what=texts.AND.join(lost))] if lost else []
         if self._controller.armed and self.traces.age > OLD:
@@ -304,19 +238,9 @@ class RunPage(QWidget):
         self.lost.setVisible(bool(said))
         set_level(self.lost, "wait")
         self._show_twin()
-        self.ramp_out.setEnabled(self._controller.running and self._controller.controls)
+        self.ramp_out.setEnabled(self._controller.running and self._controller.session.controls)
 
     def _show_twin(self) -> None:
         # an estimate may arrive after the end of the run
-        twin = self._controller.scene.twin if self._controller.running else ""
+        twin = self._controller.session.scene.twin if self._controller.running else ""
         self.twin.setText(f"{texts.TWIN}: {typeset(twin) or ABSENT}")
-
-
-def _sine(omega: float, beta: float | None) -> str:
-    """Name of a point under a sine."""
-    return (texts.BARE_SINE if beta is None else texts.SINE_POINT).format(omega=omega, beta=beta)
-
-
-def _record_point_name(record: str, beta: float | None) -> str:
-    """Name of a point under a record."""
-    return (texts.BARE_RECORD if beta is None else texts.RECORD_POINT).format(record=record, beta=beta)

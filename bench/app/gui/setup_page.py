@@ -13,20 +13,13 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from bench.app.gui import texts
+from bench.app.display import texts
+from bench.app.display.theme import Theme
 from bench.app.gui.background import Command
 from bench.app.gui.check_panel import CheckPanel
 from bench.app.gui.configuration_tree import ConfigurationTree
 from bench.app.gui.controller import Controller
-from bench.app.gui.palette import Theme
-from bench.app.gui.widgets import (
-    FITTING,
-    ask_for_files,
-    give_key,
-    scrolling,
-    set_level,
-    why_no_dialog,
-)
+from bench.app.gui.widgets import FITTING, ask_for_files, give_key, scrolling, set_level, why_no_dialog
 from bench.config.model import BenchConfiguration
 from bench.config.result_files import read_specimen
 from bench.config.toml import former_keys, read_configuration, with_identified

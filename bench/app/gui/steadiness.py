@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QGridLayout, QLabel, QWidget
 from bench.analysis.cycles import fit_cycle
 from bench.analysis.signals import MEASURED_BY
 from bench.analysis.steady import SPREAD, WINDOW, Steadiness, SteadyDetector
-from bench.app.gui import texts
+from bench.app.display import texts
 from bench.app.gui.widgets import ElidingLabel, set_level
 from bench.app.ipc.messages import TRACES, Run, Traces
 

@@ -3,7 +3,7 @@
 """Live traces of drive, table and storeys."""
 
 from itertools import cycle
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pyqtgraph as pg
@@ -11,22 +11,19 @@ from numpy.typing import NDArray
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from bench.analysis.signals import Further
-from bench.app.gui import texts
-from bench.app.gui.buffers import Ring
-from bench.app.gui.palette import Theme
-from bench.app.gui.widgets import colour_axes, round_down, unit_text
+from bench.app.display import texts
+from bench.app.display.buffers import Ring
+from bench.app.display.theme import Theme
+from bench.app.display.traces import SHOWN, STALE, WINDOW, Label, columns_of, labels_of
+from bench.app.gui.widgets import colour_axes, round_down
 from bench.app.ipc.messages import TRACES as NAMES
 from bench.app.ipc.messages import Traces
 from drivers.clock import now
 
-SHOWN = ("drive", "acceleration", "u1", "u2", "drift")
-"""Names of the drawn columns; `texts.TRACES` has their labels."""
-WINDOW, BUCKETS = 10.0, 700
-"""Displayed duration [s], and the number of parts into which it is divided, each drawn as two points."""
+BUCKETS = 700
+"""Number of parts into which the displayed duration is divided, each drawn as two points."""
 AHEAD = 0.5
 """Longest time [s] for which the axis scrolls without a new sample."""
-STALE = 2.0
-"""Age of the newest sample above which the traces are marked as not live [s]."""
 HEADROOM, WIDE, LEAST = 1.15, 2.0, 1e-3
 """Axis range relative to the largest value, ratio above which the range is reduced, and minimum range in displayed
 units.
@@ -46,7 +43,7 @@ class TracePlot(QWidget):
         self._face: float | None = None
         self._stale: int | None = None
         self.ring = Ring(len(NAMES))
-        self._columns = [NAMES.index(name) for name in SHOWN]
+        self._columns = columns_of(())
         self._fresh = False
         self._read: float | None = None
         self._length = 0.0
@@ -68,7 +65,7 @@ class TracePlot(QWidget):
         self._further = further
         self.view.clear()
         self.ring = Ring(len(NAMES) + len(further))
-        self._columns = [*(NAMES.index(name) for name in SHOWN), *range(len(NAMES), len(NAMES) + len(further))]
+        self._columns = columns_of(further)
         self._reach = np.full(len(self._columns), LEAST)
         self.plots = [self.view.addPlot(row=row, col=0) for row in range(len(self._columns))]
         self.curves = [plot.plot(antialias=False) for plot in self.plots]
@@ -77,14 +74,9 @@ class TracePlot(QWidget):
         self.use_theme(self._theme)
 
     @property
-    def labels(self) -> tuple[tuple[str, str, float], ...]:
+    def labels(self) -> tuple[Label, ...]:
         """Label, displayed unit, and displayed units per SI unit for each trace."""
-        further = ((each.name.replace("_", " "), unit_text(each.unit), 1.0) for each in self._further)
-        if self._face is None:
-            return (*texts.TRACES, *further)
-        height = 1e3 * self._face
-        lasers = ((texts.ON_BLOCK.get(name, name).format(height=height), *rest) for name, *rest in texts.TRACES)
-        return cast(tuple[tuple[str, str, float], ...], (*lasers, *further))
+        return labels_of(self._further, self._face)
 
     def watch_block(self, face: float | None) -> None:
         """Label the traces for laser 2 on the block's face at this height [m]; None for storey 2."""

@@ -1,122 +1,25 @@
-"""Fault reports for the operator (event, reaction of the bench, next step), and the panel that shows them."""
+"""The panel of the fault reports, and the reports on errors of the window itself."""
 
 import sys
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass
 from traceback import format_exception
 from types import TracebackType
 
 from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtWidgets import QFrame, QGridLayout, QHBoxLayout, QLabel, QPlainTextEdit, QPushButton, QVBoxLayout
 
-from bench.app.gui import texts
+from bench.app.display import texts
+from bench.app.display.trouble import Trouble, trouble_of
+from bench.app.display.typography import typeset
 from bench.app.gui.controller import Controller
-from bench.app.gui.widgets import give_key, set_level, typeset
+from bench.app.gui.widgets import give_key, set_level
 from bench.app.ipc.messages import Ended, Refused
 from bench.app.run_display import Notice
-from bench.guard.sensors import TIMING
-from sim.errors import Cause, CauseCode
 
-QUIET = ("completed", "stopped")
-"""Endings that require no action."""
-
-
-RUN_ENDED = "The run was {status}: {reason}."
-DID = {
-    "aborted": "The drive was ramped to zero fast, and the rig was stopped.",
-    "halted": "The enable line was cut at once, without a ramp.",
-    "failed": "The output was ramped to zero, or cut if the rig no longer responded.",
-}
-DID_NOTHING = "The table was not driven."
-KEPT = "The data recorded until then are in {out}."
-DID_REFUSE = "The run was not started: nothing was armed or written."
-DID_NOT_START = "The rig was never armed; all devices were closed again."
-DID_LOSE = (
-    "The output is brought to zero whenever a session ends; if its process crashed, by the watchdog and the heartbeat "
-    "where they are configured. The data recorded until then remain readable."
-)
-NOW_REFUSED = "Change the value named above, then check the plan again."
-NOW_LOOK = (
-    "Look at the bench: if the table moves, press the emergency stop. Then run the loop check on the Setup page before "
-    "the next test."
-)
-NOW_LIMIT = (
-    "A limit was exceeded ({subject}): inspect specimen and sensors before the next test. If they are in order, "
-    "check the margins of the plan and reduce the motion."
-)
-NOW_LATE = (
-    "The computer or the link to a device was too slow ({subject}); the motion was within its limits. "
-    "Close other programs, check cables and network, then start again."
-)
-_NOW_DEVICE = (
-    "Check power and cables of the device named above, then search for devices and run the loop check on the Setup "
-    "page."
-)
-_NOW_DISK = (
-    'Free disk space, or enter a folder on another disk in the field "Results in". `rockbench file info` describes '
-    "the recorded file."
-)
-NOW = {
-    "request": "Clear STOP in the bar at the top when the bench is safe. A new run starts from the beginning.",
-    "client_lost": (
-        "This window did not respond for some seconds. Close other programs, then start again. With the option "
-        '"Continue without this window", a run continues in this case.'
-    ),
-    "declined": "Complete the task, or remove it from the plan, then start again.",
-    "safety_input": (
-        "Find the cause at the bench and reset the input there. In the next run, the header must show that it is good."
-    ),
-    "limit": NOW_LIMIT,
-    "disk": _NOW_DISK,
-    "data_file": _NOW_DISK,
-    "memory": "Close other programs, or restart the computer, then start again.",
-    "device_timeout": _NOW_DEVICE,
-    "connection_lost": _NOW_DEVICE,
-    "device_not_found": _NOW_DEVICE,
-    "command_refused": _NOW_DEVICE,
-}
-"""Next step by code of the cause; NOW_LOOK for all other codes."""
 OWN_TROUBLE = "An error in the window, not in the bench: {error}."
 OWN_DID = "The run continues in its own process; this window may be incomplete."
 OWN_NOW = "Reopen the window after the run, and report the details to the developers."
-
-
-@dataclass(frozen=True)
-class Trouble:
-    """A fault report: event, reaction and next step; `details` are shown on request."""
-
-    what: str
-    did: str
-    now: str
-    details: str = ""
-
-
-def trouble_of(ended: Ended | Refused, *, driven: bool) -> Trouble | None:
-    """The fault report of a run, None if it ended without a fault. `driven` is whether the rig was armed in the run."""
-    if isinstance(ended, Refused):
-        return _of_refusal(ended, driven=driven)
-    if ended.status in QUIET:
-        return None
-    did = DID[ended.status] if driven else DID_NOTHING
-    what = RUN_ENDED.format(**vars(ended))
-    return Trouble(what, f"{did} {KEPT.format(out=ended.out)}", advice(ended.cause))
-
-
-def _of_refusal(refused: Refused, *, driven: bool) -> Trouble:
-    if not refused.failed:
-        now = NOW.get(refused.cause.code, NOW_REFUSED).format(subject=refused.cause.subject)
-        return Trouble(refused.text, DID_REFUSE, now, refused.details)
-    if driven:
-        return Trouble(refused.text, DID_LOSE, NOW_LOOK, refused.details)
-    return Trouble(refused.text, DID_NOT_START, advice(refused.cause), refused.details)
-
-
-def advice(cause: Cause) -> str:
-    """Next step for a cause, by its code."""
-    if cause.code == CauseCode.LIMIT and cause.subject in TIMING:
-        return NOW_LATE.format(subject=cause.subject)
-    return NOW.get(cause.code, NOW_LOOK).format(subject=cause.subject)
 
 
 class TroublePanel(QFrame):
@@ -155,7 +58,7 @@ class TroublePanel(QFrame):
         self.hide()
 
     def _end(self, ended: Ended | Refused) -> None:
-        trouble = trouble_of(ended, driven=self._controller.driven)
+        trouble = trouble_of(ended, driven=self._controller.session.driven)
         if trouble is not None:
             self.show_trouble(trouble)
 
@@ -224,7 +127,7 @@ class OwnErrors(QObject):
             return
         self._reported.add(message)
         text = texts.OWN_ERROR.format(error=message)
-        self._controller.noticed.emit(Notice(self._controller.scene.time, "window", text, grave=True))
+        self._controller.noticed.emit(Notice(self._controller.session.scene.time, "window", text, grave=True))
         if self._panel.isHidden():
             details = "".join(format_exception(error))
             what = OWN_TROUBLE.format(error=message)

@@ -1,21 +1,12 @@
-"""The verdict of a run in one sentence, in the largest font that fits."""
+"""The verdict of a run, in the largest font that fits."""
 
-from collections.abc import Mapping, Sequence
-from math import isfinite, nan
+from collections.abc import Sequence
 
-import numpy as np
 from PySide6.QtCore import QRect, QSize, Qt
 from PySide6.QtGui import QFont, QFontMetrics, QPainter, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import QLabel, QSizePolicy
 
-from bench.app.formatting import difference, measurement, number, plus_minus
-from bench.app.gui import texts
-from bench.app.gui.point_table import rows_of
-from bench.app.gui.widgets import typeset, unit_text
-from bench.datafile.tables import Column
-from bench.live_values import Estimate, LiveValue, RunningGain
-from bench.protocol import RunView
-from sim.parameters import Parameters, unit_of
+from bench.app.display import texts
 
 LARGEST, SMALLEST = 48, 14
 """Range of the font size [px]."""
@@ -25,47 +16,6 @@ UNBROKEN = 24
 """Greatest length of a part of the sentence that is kept on one line."""
 SPACE = 0.31
 """Largest share of the page's height that the sentence may occupy."""
-
-
-def verdict_of(view: RunView, finished: Parameters) -> str:
-    """The result of a finished point: value, prediction, verdict and point, or the reason for a missing value."""
-    point = finished.model_dump()
-    rows = rows_of(_columns(type(finished)), [point], view.labels)
-    found = next((row for row in rows if row.field == view.headline), rows[0] if rows else None)
-    if found is not None and isfinite(found.value):
-        return found.sentence.replace(" = ", " ")
-    status, reason = str(point.get("status") or texts.NO_VALUE), str(point.get("reason") or "")
-    return " · ".join(part for part in (texts.NO_GAIN_OF.format(status=status), typeset(reason)) if part)
-
-
-def running_verdict(event: Estimate | RunningGain | LiveValue) -> str:
-    """A running value with its prediction, its difference from the prediction, and the measured duration."""
-    if isinstance(event, LiveValue):
-        label = typeset(event.label)
-        value, effort = f"{label}  {measurement(event.value, event.uncertainty, unit_text(event.unit))}", ""
-        own, predicted = event.value, event.predicted
-    else:
-        own, predicted = event.alpha_2, event.predicted
-        uncertainty = event.uncertainty if isinstance(event, Estimate) else nan
-        value = f"{texts.ALPHA} {plus_minus(own, uncertainty)}" if isfinite(own) else texts.NO_GAIN
-        effort = (
-            texts.CYCLES.format(cycles=event.cycles)
-            if isinstance(event, Estimate)
-            else texts.SO_FAR.format(seconds=event.seconds, record=event.record)
-        )
-    words = [value]
-    if isfinite(own) and isfinite(predicted):
-        words += [f"{texts.PREDICTED} {number(predicted)}", difference(own, predicted)]
-    return " · ".join([*words, effort] if effort else words)
-
-
-def _columns(point: type[Parameters]) -> Mapping[str, Column]:
-    return {
-        name: Column(np.zeros(0), unit_of(declared), declared.description or "")
-        for name, declared in point.model_fields.items()
-    }
-
-
 FLAGS = int(Qt.TextFlag.TextWordWrap | Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignLeft)
 
 

@@ -1,7 +1,6 @@
 # pyright: reportUnknownMemberType=false
 """Shared parts of the pages: lamp, keys of buttons, levels of labels, axes of plots, the file dialog."""
 
-import re
 from collections.abc import Callable
 from math import floor, log10
 from pathlib import Path
@@ -28,12 +27,10 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from bench.app.gui import texts
+from bench.app.display import texts
+from bench.app.display.status import Shape
+from bench.app.display.theme import Theme
 from bench.app.gui.controller import Controller
-from bench.app.gui.palette import Theme
-from bench.app.gui.status import Shape
-from bench.document import typography
-from bench.document.typography import unit_text as unit_text
 
 SIDE = 56
 """Width and height of a lamp [px]."""
@@ -122,37 +119,6 @@ class ElidingLabel(QLabel):
         if text != self.text():
             super().setText(text)
             self.setToolTip("")
-
-
-def typeset(text: str) -> str:
-    """Typeset text from files and journals for the window: ω, α₂, ±, m/s²."""
-    return typography.typeset(text).replace("Ω", "ω")
-
-
-_LETTERS = {"alpha": "α", "beta": "β", "xi": "ξ", "omega": "ω"}
-_SYMBOL = re.compile(r"\b(alpha|beta|xi|omega|k|c|m)([0-9]?)\b")
-_LOW = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
-_NAME = re.compile(r"(?<=[A-Za-z0-9])_(?=[A-Za-z0-9])")
-
-
-def spaced(text: str) -> str:
-    """Typeset text that contains names of fields or channels, with spaces instead of underscores."""
-    return typeset(_NAME.sub(" ", text))
-
-
-def label(name: str) -> str:
-    """Typeset the name of a field or channel for the window: `alpha_2_low` becomes α₂ low, `xi1` ξ₁."""
-    plain = name.removesuffix("_rad_s").replace("alpha_1", "α₁").replace("alpha_2", "α₂").replace("_", " ")
-    return typeset(_SYMBOL.sub(lambda found: _LETTERS.get(found[1], found[1]) + found[2].translate(_LOW), plain))
-
-
-_SCREEN = {"m": (1e3, "mm")}
-
-
-def in_screen_unit(unit: str) -> tuple[float, str]:
-    """Displayed units per SI `unit`, and the displayed unit, typeset: millimetres for lengths."""
-    factor, shown = _SCREEN.get(unit, (1.0, unit))
-    return factor, unit_text(shown)
 
 
 class _WheelFilter(QObject):

@@ -22,11 +22,13 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from bench.app.gui import texts
+from bench.app.display import texts
+from bench.app.display.theme import Theme
+from bench.app.display.trouble import Trouble
 from bench.app.gui.attach import SessionWatch
 from bench.app.gui.controller import Controller
 from bench.app.gui.header import Header, StopFilter
-from bench.app.gui.palette import Theme, desktop_theme, dress
+from bench.app.gui.palette import desktop_theme, dress
 from bench.app.gui.panels import LeavePanel, PanelArea, Prompt, Tour
 from bench.app.gui.protocol_page import ProtocolPage
 from bench.app.gui.queue_page import QueuePage
@@ -34,7 +36,7 @@ from bench.app.gui.queue_runner import QueueRunner
 from bench.app.gui.results_page import ResultsPage
 from bench.app.gui.run_page import RunPage
 from bench.app.gui.setup_page import SetupPage
-from bench.app.gui.trouble import OwnErrors, Trouble, TroublePanel
+from bench.app.gui.trouble import OwnErrors, TroublePanel
 from bench.app.ipc.messages import Run
 from bench.app.queue.file import QueueFile
 from bench.app.queue.queue import Queued
@@ -165,7 +167,7 @@ class Window(QMainWindow):
 
     def closeEvent(self, event: QCloseEvent) -> None:
         """Ask before closing during a run that this window controls; otherwise store the layout and disconnect."""
-        drives = self._controller.running and self._controller.attached is None
+        drives = self._controller.running and self._controller.session.attached is None
         if drives and not self._leaving:
             self.leave_panel.ask(goes_on=self._goes_on)
             event.ignore()
@@ -206,7 +208,7 @@ class Window(QMainWindow):
 
     def _began(self, run: Run) -> None:
         self._goes_on = run.keep_going
-        if self._controller.attached is not None:
+        if self._controller.session.attached is not None:
             self.welcome.leave()
         if self.pages.currentWidget() is self.protocol and not self.runner.going:
             self.pages.setCurrentWidget(self.run)

@@ -1,6 +1,7 @@
 """Ctrl-C in real processes: answered within half a second in whatever phase a command is, and nothing is left behind.
 
-`python -m tests.interrupts` runs two hundred such moments.
+Ten early moments of commands of every kind; with the mark soak twenty moments of all commands, also later ones.
+`python -m tests.interrupts` runs two hundred.
 """
 
 import sys
@@ -12,7 +13,23 @@ from tests.interrupts import Bed, Moment, moments
 if sys.platform == "win32":
     pytest.skip("sends SIGINT to a group of processes", allow_module_level=True)
 
-COUNT = 20
+KINDS = (
+    "run: planning",
+    "run: point",
+    "run: json",
+    "queue",
+    "predict steady: first",
+    "predict map",
+    "predict modes",
+    "report: pdf",
+    "export csv",
+    "gui",
+)
+"""Planning in native code, rigs that are driven, a kernel that is compiled, files that are written, a window."""
+MOMENTS = [
+    *moments(len(KINDS), seed=23, only=KINDS, latest=1.5),
+    *(pytest.param(each, marks=pytest.mark.soak) for each in moments(20, seed=20, latest=6.0)),
+]
 
 
 @pytest.fixture(scope="module")
@@ -20,7 +37,7 @@ def bed(tmp_path_factory: pytest.TempPathFactory) -> Bed:
     return Bed(tmp_path_factory.mktemp("interrupts"))
 
 
-@pytest.mark.parametrize("moment", moments(COUNT, seed=20, latest=6.0), ids=lambda each: each.command.name)
+@pytest.mark.parametrize("moment", MOMENTS, ids=lambda each: each.command.name)
 def test_ctrl_c_is_answered_and_leaves_nothing(bed: Bed, moment: Moment) -> None:
     reaction = bed.reaction(moment)
     assert reaction is not None

@@ -86,18 +86,6 @@ def test_a_result_that_cannot_be_printed_is_one_line(tmp_path: Path) -> None:
     assert "Traceback" not in done.stderr
 
 
-def test_a_console_without_the_characters_shows_substitutes() -> None:
-    for command in (["predict", "steady", "--help"], ["file", "info", "--help"], ["run", "harmonic", "--help"]):
-        shown = subprocess.run(
-            [sys.executable, "-m", "bench", *command],
-            env={**os.environ, "PYTHONIOENCODING": "cp1252", "PYTHONUTF8": "0"},
-            capture_output=True,
-            timeout=60,
-        )
-        assert shown.returncode == 0, shown.stderr
-        assert b"UnicodeEncodeError" not in shown.stderr
-
-
 def test_what_outlasts_its_reader_is_wrapped_once() -> None:
     stream = lasting(StringIO())
     assert lasting(stream) is stream

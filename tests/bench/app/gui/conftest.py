@@ -10,9 +10,10 @@ from pytestqt.qtbot import QtBot
 
 from bench.app import catalogue
 from bench.app.catalogue import all_protocols
+from bench.app.display.theme import LIGHT
 from bench.app.gui.controller import Controller
 from bench.app.gui.header import StopFilter
-from bench.app.gui.palette import LIGHT, dress
+from bench.app.gui.palette import dress
 from bench.app.gui.window import Window
 from bench.app.ipc.messages import FromSession, PlanCheck
 from tests.bench.app.ipc.experiment import SHAKING, bench
@@ -69,6 +70,8 @@ def _messages_are_handled_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def spoken(monkeypatch: pytest.MonkeyPatch) -> type[ScriptedClient]:
     monkeypatch.setattr("bench.app.gui.controller.SessionClient", ScriptedClient)
+    # the client of an earlier test in this process
+    monkeypatch.delattr(ScriptedClient, "latest", raising=False)
     return ScriptedClient
 
 
@@ -87,6 +90,11 @@ class NoPlots(QWidget):
 def without_plots(monkeypatch: pytest.MonkeyPatch) -> None:
     for page in ("RunPage", "ResultsPage"):
         monkeypatch.setattr(f"bench.app.gui.window.{page}", NoPlots)
+
+
+@pytest.fixture
+def without_live_plots(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("bench.app.gui.window.RunPage", NoPlots)
 
 
 @pytest.fixture

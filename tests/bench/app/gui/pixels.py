@@ -13,8 +13,9 @@ from PySide6.QtCore import QPoint, QRect
 from PySide6.QtWidgets import QAbstractButton, QApplication, QLabel, QScrollArea, QWidget
 
 from bench.app.catalogue import all_protocols
+from bench.app.display.theme import DARK, LIGHT
 from bench.app.gui.controller import Controller
-from bench.app.gui.palette import DARK, LIGHT, dress
+from bench.app.gui.palette import dress
 from bench.app.gui.widgets import ElidingLabel
 from bench.app.gui.window import SMALLEST, Window
 from bench.app.ipc.messages import Run

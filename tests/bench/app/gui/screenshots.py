@@ -16,8 +16,9 @@ from pathlib import Path
 from PySide6.QtWidgets import QApplication
 
 from bench.app.catalogue import all_protocols, load_protocol
+from bench.app.display.theme import DARK, LIGHT
 from bench.app.gui.controller import Controller
-from bench.app.gui.palette import DARK, LIGHT, dress
+from bench.app.gui.palette import dress
 from bench.app.gui.window import Window
 from bench.app.ipc.messages import Question
 from bench.app.queue.queue import Stage, queued

@@ -15,8 +15,9 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
+from bench.app.display.theme import LIGHT
 from bench.app.gui.controller import Controller
-from bench.app.gui.palette import LIGHT, dress
+from bench.app.gui.palette import dress
 from bench.app.gui.window import Window
 from bench.app.ipc.messages import Ask, Attached, receive
 from bench.app.ipc.server import SessionServer
@@ -69,7 +70,7 @@ def test_a_window_after_a_killed_one_has_state_log_and_stop(
     assert "another window's run" in window.header.reason.text().lower()
     assert not window.protocol.start.isEnabled()
     assert window.protocol.why_not == "a run is under way"
-    qtbot.waitUntil(lambda: controller.controls, timeout=LONG)
+    qtbot.waitUntil(lambda: controller.session.controls, timeout=LONG)
     qtbot.mousePress(window.header.stop, Qt.MouseButton.LeftButton)
     qtbot.waitUntil(lambda: not controller.running, timeout=LONG)
     window.close()
@@ -83,7 +84,7 @@ def test_a_second_window_only_watches_and_stops(qtbot: QtBot, qapp: QApplication
     window = opened(qtbot, qapp)
     controller = window.header._controller  # pyright: ignore[reportPrivateUsage]
     qtbot.waitUntil(lambda: window.header.word.text() == "RUNNING", timeout=LONG)
-    assert not controller.controls
+    assert not controller.session.controls
     assert not window.run.ramp_out.isEnabled()
     controller.ramp_out()
     # the run goes on while the window leaves, offers it, and attaches again

@@ -8,10 +8,12 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QFileDialog
 from pytestqt.qtbot import QtBot
 
-from bench.app.gui import texts
+from bench.app.display import texts
 from bench.app.gui.window import Window
 from tests.bench.app.gui.conftest import ScriptedClient
 from tests.bench.app.ipc.experiment import order
+
+pytestmark = pytest.mark.usefixtures("without_live_plots")
 
 
 def _opened(window: Window, qtbot: QtBot, which: str) -> QFileDialog:

@@ -7,10 +7,10 @@ import pyqtgraph as pg
 import pytest
 from pytestqt.qtbot import QtBot
 
-from bench.app.gui import texts
+from bench.app.display import texts
+from bench.app.display.gains import lines_of, mark_of
+from bench.app.display.theme import DARK, LIGHT
 from bench.app.gui.gain_plot import GainPlot
-from bench.app.gui.gains import lines_of, mark_of
-from bench.app.gui.palette import DARK, LIGHT
 from bench.datafile.tables import Column, Table
 from bench.live_values import Estimate, RunningGain
 from protocols.earthquake.protocol import EarthquakePoint

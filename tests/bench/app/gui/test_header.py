@@ -7,13 +7,15 @@ from PySide6.QtCore import QPoint, QRect, Qt
 from PySide6.QtWidgets import QApplication, QScrollArea
 from pytestqt.qtbot import QtBot
 
-from bench.app.gui import texts
-from bench.app.gui.status import bench_status
+from bench.app.display import texts
+from bench.app.display.status import bench_status
 from bench.app.gui.window import Window
 from bench.app.ipc.messages import Beat, Ended, Opened, Preparing, Published, Question, Refused, SafetyInputs
 from bench.events import Progress, State, StateChanged, StepStarted
 from tests.bench.app.gui.conftest import ScriptedClient
 from tests.bench.app.ipc.experiment import order
+
+NO_PLOTS = pytest.mark.usefixtures("without_live_plots")
 
 
 def test_every_state_has_its_word_and_no_colour_stands_for_two_things_of_one_shape() -> None:
@@ -34,6 +36,7 @@ def link(window: Window, spoken: type[ScriptedClient]) -> ScriptedClient:
     return spoken.latest
 
 
+@NO_PLOTS
 def test_state_step_time_and_inputs_are_shown(window: Window, link: ScriptedClient) -> None:
     header = window.header
     link.said = [
@@ -95,6 +98,7 @@ def test_stop_stays_in_its_place_whatever_is_said(window: Window, link: Scripted
     assert window.width() == window.minimumWidth()
 
 
+@NO_PLOTS
 def test_silence_is_shown_as_no_link(window: Window, link: ScriptedClient) -> None:
     link.said = [Beat(State.RUNNING, "the sine begins", 1.0, 0, 0)]
     window._controller._look()
@@ -107,6 +111,7 @@ def test_silence_is_shown_as_no_link(window: Window, link: ScriptedClient) -> No
     assert window._controller.armed, "what is not known counts as armed"
 
 
+@NO_PLOTS
 def test_a_dead_session_says_what_happened_and_what_to_do(window: Window, link: ScriptedClient) -> None:
     link.said = [Refused("the session process ended without a message (exit code -9)", failed=True)]
     window._controller._look()
@@ -172,6 +177,7 @@ def test_check_and_start_are_in_view_on_small_screens(window: Window, qtbot: QtB
             assert button.visibleRegion().boundingRect() == button.rect()
 
 
+@NO_PLOTS
 def test_closing_asks_while_a_run_is_driven(window: Window, link: ScriptedClient, qtbot: QtBot) -> None:
     window.close()
     assert window.isVisible()
@@ -186,6 +192,7 @@ def test_closing_asks_while_a_run_is_driven(window: Window, link: ScriptedClient
     assert link.asked == ["leave"]
 
 
+@NO_PLOTS
 def test_closing_asks_nothing_when_the_run_is_over(window: Window, link: ScriptedClient) -> None:
     link.said = [Ended("completed", "the plan was carried out", {}, "", Path("never"))]
     window._controller._look()
@@ -193,11 +200,12 @@ def test_closing_asks_nothing_when_the_run_is_over(window: Window, link: Scripte
     assert not window.isVisible()
 
 
-@pytest.mark.usefixtures("window")
+@pytest.mark.usefixtures("without_live_plots", "window")
 def test_the_main_loop_keeps_the_link_alive(link: ScriptedClient, qtbot: QtBot) -> None:
     qtbot.waitUntil(lambda: link.beats >= 3, timeout=3000)
 
 
+@NO_PLOTS
 def test_a_session_that_plans_on_a_busy_computer_is_not_lost(window: Window, link: ScriptedClient) -> None:
     """No rig is open: the state is known. A process that has died is lost."""
     link.said = [Preparing("simulating starts", 1, 4)]

@@ -21,10 +21,10 @@ from PySide6.QtWidgets import (
 )
 from pytestqt.qtbot import QtBot
 
-from bench.app.gui import texts
+from bench.app.display import texts
+from bench.app.display.theme import DARK, LIGHT
 from bench.app.gui.controller import Controller
 from bench.app.gui.header import StopButton
-from bench.app.gui.palette import DARK, LIGHT
 from bench.app.gui.window import Window
 from bench.app.ipc.messages import Question
 from bench.app.queue.queue import Queued

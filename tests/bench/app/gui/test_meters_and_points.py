@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 from pytestqt.qtbot import QtBot
 
 from bench.app.catalogue import load_protocol
-from bench.app.gui.campaign_matrix import Campaign
+from bench.app.display.campaign import Campaign
+from bench.app.display.meters import Meter, meters_of
+from bench.app.display.verdict import verdict_of
 from bench.app.gui.controller import Controller
 from bench.app.gui.log_panel import LogPanel
-from bench.app.gui.meters import Meter, meters_of
 from bench.app.gui.motion_plot import spectrum, stroboscopic
-from bench.app.gui.verdict import LARGEST, VerdictLabel, verdict_of
+from bench.app.gui.verdict import LARGEST, VerdictLabel
 from bench.app.run_display import Notice
 from bench.config.model import BenchConfiguration
 from bench.events import PointFinished

@@ -10,10 +10,11 @@ from PySide6.QtCore import QThread
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
+from bench.app.display.theme import LIGHT
+from bench.app.display.trouble import Trouble
 from bench.app.gui.controller import Controller
 from bench.app.gui.header import KEY
-from bench.app.gui.palette import LIGHT
-from bench.app.gui.trouble import Trouble, TroublePanel
+from bench.app.gui.trouble import TroublePanel
 from bench.app.gui.window import Window, attend
 from tests.bench.app.gui.conftest import SHAKING
 from tests.bench.app.ipc.experiment import bench

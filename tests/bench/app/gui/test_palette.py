@@ -3,7 +3,8 @@
 import pytest
 from PySide6.QtGui import QColor, QPalette
 
-from bench.app.gui.palette import DARK, LIGHT, Theme, qt_palette
+from bench.app.display.theme import DARK, LIGHT, Theme
+from bench.app.gui.palette import qt_palette
 
 
 def _luminance(colour: QColor) -> float:

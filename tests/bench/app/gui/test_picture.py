@@ -1,20 +1,20 @@
 """The picture: measured frame, modelled block, and how large the motion is drawn."""
 
-from math import pi
-from unittest.mock import MagicMock
+from math import pi, sin
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QPoint, QPointF, QRectF, Qt
+from PySide6.QtCore import QPoint, QPointF, Qt
 from PySide6.QtGui import QWheelEvent
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
-from bench.app.gui import texts
-from bench.app.gui.buffers import BEHIND, STEP, BlockAngle
-from bench.app.gui.palette import LIGHT
-from bench.app.gui.picture import FACTOR, FLASH, LARGEST, Drawing, PhysicalPicture, Pose
-from bench.app.gui.status import Arrangement
+from bench.app.display import texts
+from bench.app.display.buffers import BEHIND, STEP, BlockAngle
+from bench.app.display.picture import FACTOR, FLASH, Outline, Pose
+from bench.app.display.status import Arrangement
+from bench.app.display.theme import LIGHT
+from bench.app.gui.picture import LARGEST, PhysicalPicture
 from bench.app.ipc.messages import TRACES, Traces
 from bench.events import SpecimenMounted
 from drivers.rig import OperatorTask
@@ -110,7 +110,9 @@ def test_contact_impact_and_what_is_not_known_look_different(picture: PhysicalPi
     def drawn(block: tuple[float, float] | None, coupled: bool = True) -> bytes:
         picture.show_arrangement(Arrangement(block=coupled, spring=coupled))
         picture.move_to(_motion(u1=0.001), block)
-        return bytes(picture.canvas.grab().toImage().constBits())
+        # the bits are valid only while the image exists
+        image = picture.canvas.grab().toImage()
+        return bytes(image.constBits())
 
     looks = [
         drawn(None, coupled=False),
@@ -129,20 +131,34 @@ def test_contact_impact_and_what_is_not_known_look_different(picture: PhysicalPi
 @pytest.mark.parametrize("angle", [0.2, -0.2])
 def test_the_block_turns_about_the_corner_it_stands_on(angle: float) -> None:
     """Against a rotation by complex numbers: theta > 0 about the corner on the frame's side, the top towards it."""
-    painter = MagicMock()
-    drawing = Drawing(painter, LIGHT, COUPLED, QRectF(0, 0, 500, 260))
-    drawing.draw_block(Pose())
-    drawing.draw_block(Pose(angle=angle))
+    arrangement = Arrangement(block=True, spring=True)
     rest, turned = (
-        np.array([complex(at.x(), -at.y()) for at in call.args[0]])
-        for call in painter.drawPolygon.call_args_list
-        if len(call.args[0]) == 4
+        np.array([complex(*at) for at in shape.points])
+        for pose in (Pose(angle=0.0), Pose(angle=angle))
+        for shape in Outline(COUPLED).shapes(pose, arrangement)
+        if shape.role == "block"
     )
     lower_left, lower_right = rest[0], rest[1]
     corner = lower_left if angle > 0.0 else lower_right
-    np.testing.assert_allclose(turned, corner + (rest - corner) * np.exp(1j * angle), atol=1e-9)
+    np.testing.assert_allclose(turned, corner + (rest - corner) * np.exp(1j * angle), atol=1e-12)
     assert (turned[2:].real < rest[2:].real).all() == (angle > 0.0)
     assert turned.imag.min() == pytest.approx(corner.imag), "no part of it is below the table"
+
+
+def test_each_beam_ends_on_what_its_laser_measures() -> None:
+    frame, pose = COUPLED.frame, Pose(ground=0.01, first=0.02, second=-0.03, angle=0.1)
+    for face in (None, 0.3):
+        outline = Outline(COUPLED)
+        shapes = outline.shapes(pose, Arrangement(block=True, face=face))
+        beams = {shape.points[1][1]: shape.points[1] for shape in shapes if shape.role == "beam"}
+        storeys = {shape.points[0][1]: shape.points[0] for shape in shapes if shape.role == "storey"}
+        assert beams.keys() == {frame.h1, frame.h2 if face is None else face}
+        assert beams[frame.h1] == storeys[frame.h1]
+        if face is None:
+            assert beams[frame.h2] == storeys[frame.h2]
+        else:
+            foot = next(shape.points[0] for shape in shapes if shape.role == "block")
+            assert beams[face] == pytest.approx((foot[0] - face * sin(0.1), face)), "on the turned left face"
 
 
 def test_without_the_model_it_says_so(picture: PhysicalPicture) -> None:

@@ -10,9 +10,10 @@ from PySide6.QtWidgets import QApplication, QLineEdit
 from pytestqt.qtbot import QtBot
 
 from bench.app.catalogue import load_protocol
+from bench.app.display.theme import LIGHT
 from bench.app.formatting import measurement
 from bench.app.gui.controller import Controller
-from bench.app.gui.palette import LIGHT, dress
+from bench.app.gui.palette import dress
 from bench.app.gui.window import Window
 from bench.config.model import BenchConfiguration
 from tests.bench.app.gui.conftest import PROTOCOLS

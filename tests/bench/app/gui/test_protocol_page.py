@@ -9,7 +9,7 @@ from PySide6.QtGui import QWheelEvent
 from PySide6.QtWidgets import QApplication, QLabel, QLineEdit, QTableWidgetItem, QWidget
 from pytestqt.qtbot import QtBot
 
-from bench.app.gui import texts
+from bench.app.display import texts
 from bench.app.gui.form import Form
 from bench.app.gui.window import Window
 from bench.app.ipc.messages import PlanChecked, Refused, Run

@@ -10,10 +10,10 @@ from PySide6.QtWidgets import QLineEdit
 from pytestqt.qtbot import QtBot
 
 from bench.app.cli.main import main
-from bench.app.gui import texts
+from bench.app.display import texts
+from bench.app.display.theme import LIGHT
 from bench.app.gui.controller import Controller
 from bench.app.gui.header import KEY
-from bench.app.gui.palette import LIGHT
 from bench.app.gui.window import Window
 from bench.app.ipc.messages import Ended, FromSession, PlanChecked, Question, Refused, Run
 from bench.app.queue.file import LEFT, QueueFile

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from pytestqt.qtbot import QtBot
 
-from bench.app.gui import texts
+from bench.app.display import texts
 from bench.app.gui.controller import Controller
 from bench.app.ipc.messages import SILENCE, Beat
 from bench.events import State

@@ -11,12 +11,12 @@ from PySide6.QtGui import QDesktopServices, QImage
 from pytestqt.qtbot import QtBot
 from scipy.io import loadmat
 
-from bench.app.gui import texts
+from bench.app.display import texts
+from bench.app.display.gains import compare
+from bench.app.display.theme import LIGHT
 from bench.app.gui.controller import Controller
-from bench.app.gui.gains import compare
 from bench.app.gui.history_view import read_stretch
 from bench.app.gui.outputs import free
-from bench.app.gui.palette import LIGHT
 from bench.app.gui.results_page import ResultsPage
 from bench.app.ipc.messages import Ended
 from bench.config.model import BenchConfiguration

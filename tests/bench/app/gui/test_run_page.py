@@ -12,14 +12,13 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
-from bench.app.gui import texts
-from bench.app.gui.buffers import Ring
-from bench.app.gui.palette import LIGHT
+from bench.app.display import texts
+from bench.app.display.buffers import Ring
+from bench.app.display.theme import LIGHT
 from bench.app.gui.run_page import GAINS_HEIGHT
 from bench.app.gui.traces import AHEAD, LEAST
 from bench.app.gui.window import Window
 from bench.app.ipc.messages import TRACES, Beat, Ended, PlanChecked, Published, Question, Traces
-from bench.app.run_display import Notice
 from bench.datafile.tables import Column
 from bench.events import PointFinished, SpecimenMounted, State, StateChanged, Warned
 from bench.findings import FitFinished, FittedParameter, Series
@@ -318,12 +317,12 @@ def test_a_protocol_without_a_gain_shows_its_fits_instead_of_an_empty_gain_plot(
     window._controller._look()
     assert not run.shown_plot.isHidden()
     assert run.shown_plot.currentWidget() is run.live
-    assert run.live.drawn == ["laser_1", "laser_1_fitted"]
+    assert run.live.drawn == ["laser 1", "laser 1 fitted"]
     curve = run.live.getPlotItem().listDataItems()[0]
     assert curve.getData()[1].max() == pytest.approx(1.0), "in mm"
     assert "(1234.5 ± 3.0) N/m" in run.verdict.sentence
     assert "±" in run.point.text()
-    window._controller._finish_run(Ended("completed", "", {}, "", Path("never")), Notice(0.0, "end", ""))
+    window._controller._take(Ended("completed", "", {}, "", Path("never")))
     window._controller.start(replace(order(Path("never")), protocol="harmonic", parameters=HarmonicParameters()))
     assert run.shown_plot.currentWidget() is run.gains
     assert run.live.drawn == []

@@ -12,14 +12,15 @@ from pytestqt.qtbot import QtBot
 
 from bench.analysis.check_line import CheckLine, judged, stated
 from bench.app.catalogue import load_protocol
-from bench.app.gui import texts
+from bench.app.display import texts
+from bench.app.display.typography import typeset
 from bench.app.gui.configuration_tree import ConfigurationTree
-from bench.app.gui.widgets import typeset, unit_text
 from bench.app.gui.window import Window
 from bench.app.ipc.messages import Ended, Published, Run
 from bench.config.model import BenchConfiguration
 from bench.config.result_files import write_specimen
 from bench.config.template import as_toml, write_template
+from bench.document.typography import unit_text
 from bench.events import PointFinished
 from sim.identified import Finding, Identified
 from tests.bench.app.gui.conftest import ScriptedClient

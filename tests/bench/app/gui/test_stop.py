@@ -9,7 +9,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QDialog, QLineEdit, QVBoxLayout
 from pytestqt.qtbot import QtBot
 
-from bench.app.gui import texts
+from bench.app.display import texts
 from bench.app.gui.controller import DELIBERATE
 from bench.app.gui.header import KEY
 from bench.app.gui.window import Window
@@ -17,6 +17,8 @@ from bench.app.ipc.messages import Beat, Ended
 from bench.events import State
 from tests.bench.app.gui.conftest import ScriptedClient
 from tests.bench.app.ipc.experiment import order
+
+NO_PLOTS = pytest.mark.usefixtures("without_plots")
 
 
 @pytest.fixture
@@ -28,6 +30,7 @@ def link(window: Window, spoken: type[ScriptedClient]) -> ScriptedClient:
     return spoken.latest
 
 
+@NO_PLOTS
 def test_the_button_aborts_and_the_next_press_halts(window: Window, link: ScriptedClient, qtbot: QtBot) -> None:
     stop = window.header.stop
     place = stop.geometry()
@@ -55,6 +58,7 @@ def test_the_key_works_on_every_page(page: int, window: Window, link: ScriptedCl
     assert link.asked == ["abort"]
 
 
+@NO_PLOTS
 def test_the_key_works_behind_a_modal_dialog(window: Window, link: ScriptedClient, qtbot: QtBot) -> None:
     dialog = QDialog(window)
     field = QLineEdit()
@@ -70,6 +74,7 @@ def test_the_key_works_behind_a_modal_dialog(window: Window, link: ScriptedClien
     assert link.asked == ["abort"]
 
 
+@NO_PLOTS
 def test_a_press_counts_beside_a_list_that_is_open(window: Window, link: ScriptedClient, qtbot: QtBot) -> None:
     """As the window system delivers it: to whatever has the mouse then, which is the list."""
     window.pages.setCurrentWidget(window.protocol)
@@ -85,6 +90,7 @@ def test_a_press_counts_beside_a_list_that_is_open(window: Window, link: Scripte
     window.protocol.choice.hidePopup()
 
 
+@NO_PLOTS
 def test_a_key_that_is_held_counts_once(window: Window, link: ScriptedClient, qapp: QApplication) -> None:
     for again in (False, True, True, True):
         event = QKeyEvent(QEvent.Type.KeyPress, KEY, Qt.KeyboardModifier.NoModifier, "", again)
@@ -92,6 +98,7 @@ def test_a_key_that_is_held_counts_once(window: Window, link: ScriptedClient, qa
     assert link.asked == ["abort"]
 
 
+@NO_PLOTS
 def test_stop_latches_until_it_is_cleared(
     window: Window, link: ScriptedClient, qtbot: QtBot, spoken: type[ScriptedClient]
 ) -> None:
@@ -110,6 +117,7 @@ def test_stop_latches_until_it_is_cleared(
     assert protocol.why_not == texts.START_UNCHECKED
 
 
+@NO_PLOTS
 def test_a_latched_stop_makes_the_bar_red_and_offers_to_clear_it(window: Window, qtbot: QtBot) -> None:
     header = window.header
     header.refresh()
@@ -127,6 +135,7 @@ def test_a_latched_stop_makes_the_bar_red_and_offers_to_clear_it(window: Window,
     assert not window._controller.latched
 
 
+@NO_PLOTS
 def test_a_latched_stop_cannot_be_cleared_during_its_run(window: Window, link: ScriptedClient, qtbot: QtBot) -> None:
     assert link.status == "linked"
     qtbot.keyClick(window, KEY)
@@ -134,6 +143,7 @@ def test_a_latched_stop_cannot_be_cleared_during_its_run(window: Window, link: S
     assert not window.header.clear.isEnabled()
 
 
+@NO_PLOTS
 def test_the_bar_says_when_the_key_needs_the_focus(
     window: Window, qapp: QApplication, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -147,16 +157,17 @@ def test_the_bar_says_when_the_key_needs_the_focus(
     assert "F12 works only while this window has the focus" in header.reason.text()
 
 
-@pytest.mark.parametrize("key", [Qt.Key.Key_Space, Qt.Key.Key_Return, Qt.Key.Key_Escape])
-def test_no_other_key_stops_or_starts(key: Qt.Key, window: Window, link: ScriptedClient, qtbot: QtBot) -> None:
-    for page in range(len(texts.PAGES)):
-        window.pages.setCurrentIndex(page)
-        qtbot.keyClick(QApplication.focusWidget() or window, key)
-    assert link.asked == []
+def test_no_other_key_stops_or_starts(window: Window, link: ScriptedClient, qtbot: QtBot) -> None:
+    for key in (Qt.Key.Key_Space, Qt.Key.Key_Return, Qt.Key.Key_Escape):
+        for page in range(len(texts.PAGES)):
+            window.pages.setCurrentIndex(page)
+            qtbot.keyClick(QApplication.focusWidget() or window, key)
+        assert link.asked == [], key
     assert window.header.stop.focusPolicy() == Qt.FocusPolicy.NoFocus
     assert window.protocol.start.focusPolicy() == Qt.FocusPolicy.NoFocus
 
 
+@NO_PLOTS
 def test_stop_without_a_run_latches_too(window: Window, qtbot: QtBot) -> None:
     qtbot.keyClick(window, KEY)
     assert window._controller.latched

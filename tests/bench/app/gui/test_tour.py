@@ -5,10 +5,10 @@ from pathlib import Path
 import pytest
 from pytestqt.qtbot import QtBot
 
+from bench.app.display.theme import LIGHT
+from bench.app.display.trouble import Trouble
 from bench.app.gui.controller import Controller
-from bench.app.gui.palette import LIGHT
 from bench.app.gui.panels import DONE, LATER, NEXT, Tour
-from bench.app.gui.trouble import Trouble
 from bench.app.gui.window import Window
 from bench.app.ipc.messages import Ended, PlanChecked, Question, Refused
 from bench.config.model import BenchConfiguration

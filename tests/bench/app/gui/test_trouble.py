@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
 
-from bench.app.gui import texts
-from bench.app.gui.header import STALE
-from bench.app.gui.trouble import (
+from bench.app.display import texts
+from bench.app.display.session_state import STALE
+from bench.app.display.trouble import (
     DID_LOSE,
     DID_NOT_START,
     DID_NOTHING,
@@ -169,7 +169,7 @@ def test_safety_inputs_that_are_old_are_unknown(
     controller._look()
     assert header.inputs.text() == "emergency stop good, over-travel OPEN"
     later = now() + STALE + 0.1
-    monkeypatch.setattr("bench.app.gui.controller.now", lambda: later)
+    monkeypatch.setattr("bench.app.display.session_state.now", lambda: later)
     header.refresh()
     assert header.inputs.text() == "emergency stop unknown, over-travel unknown"
     assert header.inputs.property("level") == "wait"

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from math import hypot, isfinite, nan
 from typing import Any, cast
 
+from bench.app.display import texts
+from bench.app.display.typography import in_screen_unit, label, spaced, typeset
 from bench.app.formatting import ABSENT, measurement
-from bench.app.gui import texts
-from bench.app.gui.widgets import in_screen_unit, label, spaced, typeset
 from bench.datafile.tables import Column
 from bench.document.typography import first_words, without_unit
 

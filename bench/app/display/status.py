@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal
 
-from bench.app.gui import texts
+from bench.app.display import texts
 from bench.events import SpecimenMounted, State
 from drivers.rig import OperatorTask
 

@@ -11,7 +11,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.app.gui import texts
+from bench.app.display import texts
 from bench.datafile.tables import Table
 
 Kind = Literal["spectrum", "curve"]

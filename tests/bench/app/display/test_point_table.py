@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 
-from bench.app.gui.point_table import every_field, rows_of
+from bench.app.display.point_table import every_field, rows_of
 from bench.datafile.tables import Column
 from protocols.free_rocking.protocol import PROTOCOL as FREE_ROCKING
 

@@ -1,4 +1,4 @@
-"""Text of the window."""
+"""Text of the window and of the live page."""
 
 from bench.events import State
 
@@ -17,6 +17,7 @@ WORDS = {
 }
 NO_SESSION, STARTING, PLANNING, NO_LINK = "NO RUN", "STARTING", "PLANNING", "NO LINK"
 NO_SESSION_WHY = "no run has been started in this window; choose a protocol"
+NO_RUN_HERE = "no run is under way on this computer"
 RUN_ELSEWHERE, ATTACHING = "RUN ELSEWHERE", "ATTACHING"
 ELSEWHERE = "a run is under way on this computer: {run}; attach to watch or stop it"
 ATTACHING_WHY = "waiting for the session: {run}"

@@ -1,0 +1,104 @@
+"""Contents of a run display that follow from the events: verdict, current point, specimen, and last result."""
+
+from typing import Any
+
+from bench.analysis.uncertainty import COVERAGE
+from bench.app.catalogue import load_protocol
+from bench.app.display import texts
+from bench.app.display.status import Arrangement
+from bench.app.display.typography import in_screen_unit, label, typeset
+from bench.app.display.verdict import running_verdict, verdict_of
+from bench.app.formatting import measurement
+from bench.app.ipc.messages import Run
+from bench.events import Event, PointFinished, SpecimenMounted
+from bench.findings import FitFinished, TableIdentified
+from bench.live_values import Estimate, LiveValue, RunningGain
+from bench.protocol import Protocol
+
+
+class RunContents:
+    """Contents of the display of one run.
+
+    protocol : the protocol; None before the first run.
+    sentence : the verdict, or the running value, in one sentence.
+    point : the current or last point.
+    arrangement : the specimen on the table and the targets of the lasers.
+    result : the last fit, or the last response of the table.
+    """
+
+    def __init__(self, run: Run | None = None) -> None:
+        self.protocol: Protocol[Any] | None = None if run is None else load_protocol(run.protocol)
+        self.sentence = texts.NO_GAIN if self.has_gain else texts.NO_RESULT
+        self.point = ""
+        self.arrangement = Arrangement()
+        self.result: FitFinished | TableIdentified | None = None
+        self._has_live_value = False
+
+    @property
+    def has_gain(self) -> bool:
+        """Whether the points of the protocol have a gain."""
+        return self.protocol is None or "alpha_2" in self.protocol.point.model_fields
+
+    def follow(self, event: Event) -> None:
+        """Update the contents with an event."""
+        match event:
+            case Estimate():
+                self.point = texts.MEASURING.format(point=_sine(event.omega, event.beta))
+                self.sentence = running_verdict(event)
+                self._couple(event.beta)
+            case RunningGain():
+                self.point = texts.MEASURING.format(point=_record(event.record, event.beta))
+                self.sentence = running_verdict(event)
+                self._couple(event.beta)
+            case LiveValue():
+                self._has_live_value = True
+                self.sentence = running_verdict(event)
+            case PointFinished():
+                self._finish(event)
+            case FitFinished() | TableIdentified() if not self.has_gain:
+                self._show_result(event)
+            case SpecimenMounted():
+                self.arrangement.follow(event)
+            case _:
+                pass
+
+    def _finish(self, event: PointFinished) -> None:
+        """Show the result of a point, with the same uncertainty as in the log and the data file."""
+        point, protocol = event.point.model_dump(), self.protocol
+        if protocol is None:
+            return
+        if protocol.log_line is not None:
+            self.sentence = typeset(protocol.log_line(event.point))
+        elif protocol.view.headline or not self._has_live_value:
+            # for a protocol without a headline, the live value is the verdict
+            self.sentence = verdict_of(protocol.view, event.point)
+        if "alpha_2" not in point:
+            return
+        omega, beta = point.get("omega_rad_s"), point.get("beta")
+        where = _record(point["record"], beta) if "record" in point else "" if omega is None else _sine(omega, beta)
+        self.point = texts.LAST_POINT.format(status=point.get("status", ""), point=where)
+
+    def _show_result(self, event: FitFinished | TableIdentified) -> None:
+        self.result = event
+        if isinstance(event, FitFinished) and event.parameters:
+            name, found = next(iter(event.parameters.items()))
+            factor, unit = in_screen_unit(found.unit)
+            value = measurement(factor * found.value, COVERAGE * factor * found.uncertainty, unit)
+            self.sentence = f"{label(name)} {value}"
+            self.point = f"{typeset(event.name)}: {typeset(event.text)}"
+        else:
+            self.point = typeset(event.text)
+
+    def _couple(self, beta: float | None) -> None:
+        if (beta is not None) != self.arrangement.spring:
+            self.arrangement.block = self.arrangement.spring = beta is not None
+
+
+def _sine(omega: float, beta: float | None) -> str:
+    """Name of a point under a sine."""
+    return (texts.BARE_SINE if beta is None else texts.SINE_POINT).format(omega=omega, beta=beta)
+
+
+def _record(record: str, beta: float | None) -> str:
+    """Name of a point under a record."""
+    return (texts.BARE_RECORD if beta is None else texts.RECORD_POINT).format(record=record, beta=beta)

@@ -1,0 +1,56 @@
+"""The latest state of the page, serialised once for all browsers, and sent in the parts that have changed."""
+
+import json
+import threading
+from collections.abc import Mapping
+
+from drivers.clock import now
+
+WANTED = 2.0
+"""Time after the last wait of a browser during which the document is kept up to date [s]."""
+
+
+class Feed:
+    """Parts of a document, each a JSON value with the number of its last change."""
+
+    def __init__(self) -> None:
+        self._changed = threading.Condition()
+        self._parts: dict[str, tuple[int, bytes]] = {}
+        self._version = 0
+        self._read = -WANTED
+        self.closed = False
+
+    @property
+    def has_readers(self) -> bool:
+        """Whether a browser has recently waited for the document."""
+        return now() - self._read < WANTED
+
+    def publish(self, document: Mapping[str, object]) -> None:
+        """Replace the parts of the document. Raises ValueError for a number that JSON cannot represent."""
+        parts = {
+            name: json.dumps(part, separators=(",", ":"), allow_nan=False).encode() for name, part in document.items()
+        }
+        with self._changed:
+            changed = {
+                name: text for name, text in parts.items() if name not in self._parts or self._parts[name][1] != text
+            }
+            if changed:
+                self._version += 1
+                self._parts.update({name: (self._version, text) for name, text in changed.items()})
+                self._changed.notify_all()
+
+    def since(self, version: int, timeout: float) -> tuple[int, bytes]:
+        """The present version, and the parts that changed after `version` (0 for all) as a JSON object; it is empty if
+        none changes within `timeout` seconds.
+        """
+        with self._changed:
+            self._read = now()
+            self._changed.wait_for(lambda: self._version > version or self.closed, timeout)
+            found = [(name, text) for name, (number, text) in self._parts.items() if number > version]
+            return self._version, b"{%b}" % b",".join(b'"%b":%b' % (name.encode(), text) for name, text in found)
+
+    def close(self) -> None:
+        """End all waits."""
+        with self._changed:
+            self.closed = True
+            self._changed.notify_all()

@@ -1,0 +1,54 @@
+"""Serves the page of the sessions on this computer until it is told to end."""
+
+import secrets
+import threading
+
+from bench.app.ipc.sessions import FOLDER, sessions_folder
+from bench.app.watch.document import document_of
+from bench.app.watch.feed import Feed
+from bench.app.watch.follower import SessionFollower
+from bench.app.watch.server import PageServer
+from sim import waiting
+from sim.errors import InvalidInput
+
+PERIOD = 0.1
+"""Interval between two states of the page [s]."""
+LAST = 0.5
+"""Time for which the last state is still sent before the server ends [s]."""
+
+
+class LivePage:
+    """The page, served at `url` from its creation.
+
+    address, port : interface and port to listen on; port 0 is any free one.
+    process : identifier of the only process whose session is shown; None for any.
+
+    Raises InvalidInput if the address cannot be used, or if sessions are not announced.
+    """
+
+    def __init__(self, address: str, port: int, *, with_token: bool = True, process: int | None = None) -> None:
+        if sessions_folder() is None:
+            why = "the live page needs the announcements of the sessions: unset the variable, or name a private folder"
+            raise InvalidInput(FOLDER, "off", why)
+        self._feed, self._follower = Feed(), SessionFollower(process)
+        self._server = PageServer(address, port, secrets.token_urlsafe(16) if with_token else "", self._feed)
+        self.url = self._server.url
+        self._server.start()
+
+    def serve(self, over: threading.Event) -> None:
+        """Follow the sessions until `over` is set; then end all connections."""
+        try:
+            while not waiting.wait(over, PERIOD):
+                self._update()
+            # the end of the run may have been sent with the end of this process
+            waiting.wait(threading.Event(), PERIOD)
+            self._update()
+            waiting.wait(threading.Event(), LAST if self._feed.has_readers else 0.0)
+        finally:
+            self._follower.close()
+            self._server.close()
+
+    def _update(self) -> None:
+        self._follower.update()
+        if self._feed.has_readers:
+            self._feed.publish(document_of(self._follower))
