@@ -18,10 +18,14 @@ import tempfile
 import threading
 import time
 from collections.abc import Sequence
+from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass, field, replace
+from functools import cached_property
+from io import StringIO
 from math import inf
 from pathlib import Path
 
+from bench.app.cli.main import main
 from tests.lateness import Lateness
 from tests.whole import partial
 
@@ -127,13 +131,18 @@ class Bed:
     """A folder with what the commands need: a short campaign and a queue."""
 
     def __init__(self, folder: Path) -> None:
-        self.folder, self.file, self.queue = folder, folder / "run" / "campaign.h5", folder / "queue.json"
-        command = [sys.executable, "-m", "bench", "run", "harmonic", "--omega", "16", "--beta", "0.4", "--json"]
-        subprocess.run([*command, "--out", str(folder / "run")], check=True, capture_output=True)
+        self.folder, self.queue, self.configuration = folder, folder / "queue.json", folder / "rockbench.toml"
         tests = [{"protocol": "harmonic", "parameters": {"omega": [16.0], "beta": [0.4]}}]
         whole = {"format": "rocking-bench queue", "format_version": 1, "tests": tests}
         self.queue.write_text(json.dumps(whole), encoding="utf-8")
-        subprocess.run([sys.executable, "-m", "bench", "config", "init"], check=True, cwd=folder, capture_output=True)
+        _run("config", "init", str(self.configuration))
+
+    @cached_property
+    def file(self) -> Path:
+        """A short campaign, recorded when a command first needs it."""
+        out = self.folder / "run"
+        _run("run", "harmonic", "--omega", "16", "--beta", "0.4", "--json", "--out", str(out))
+        return out / "campaign.h5"
 
     def reaction(self, drawn: Moment) -> Reaction | None:
         """What comes of a moment, or of an earlier one where this machine is faster than the command's span says."""
@@ -151,7 +160,9 @@ class Bed:
             work.mkdir()
             temporary.mkdir()
             queue = shutil.copy(self.queue, work)
-            names = {"FILE": str(self.file), "QUEUE": str(queue), "CONFIG": str(self.folder / "rockbench.toml")}
+            names = {"QUEUE": str(queue), "CONFIG": str(self.configuration)}
+            if "FILE" in command.line:
+                names["FILE"] = str(self.file)
             line = [names.get(word, word.replace("NEW", str(work / "new"))) for word in command.line.split()]
             environment = os.environ | {"TMPDIR": str(temporary), "QT_QPA_PLATFORM": "offscreen"}
             environment.pop("PYTHONDONTWRITEBYTECODE", None)
@@ -207,6 +218,12 @@ class Bed:
             )
             _judge(reaction, lines, process.pid, work, temporary)
         return reaction
+
+
+def _run(*arguments: str) -> None:
+    with redirect_stdout(StringIO()), redirect_stderr(StringIO()) as errors:
+        code = main(arguments)
+    assert code == 0, errors.getvalue()
 
 
 def _read(process: "subprocess.Popen[bytes]", lines: list[tuple[float, str]]) -> None:
@@ -280,7 +297,7 @@ def moments(count: int, seed: int, only: Sequence[str] = (), latest: float = inf
     return drawn
 
 
-def main() -> int:
+def print_reactions() -> int:
     """Print every reaction, then the worst of each command. Returns 1 when any was at fault."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--moments", type=int, default=200)
@@ -317,4 +334,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(print_reactions())

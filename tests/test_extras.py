@@ -5,7 +5,9 @@ import shutil
 import subprocess
 import sys
 import tomllib
+from collections.abc import Iterable
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 
@@ -14,7 +16,9 @@ from sim.extras import EXTRAS, MissingExtra, require
 PROJECT = Path(__file__).parent.parent
 
 BLOCKED = """
-import sys
+import json, sys
+from contextlib import redirect_stderr, redirect_stdout
+from io import StringIO
 
 class Absent:
     def find_spec(self, name, path=None, target=None):
@@ -23,21 +27,36 @@ class Absent:
 
 sys.meta_path.insert(0, Absent())
 from bench.app.cli.main import main
-sys.exit(main({argv!r}))
+done = []
+for argv in {lines!r}:
+    out, err = StringIO(), StringIO()
+    with redirect_stdout(out), redirect_stderr(err):
+        code = main(argv)
+    done.append((code, out.getvalue(), err.getvalue()))
+print(json.dumps(done))
 """
 
 HARDWARE = 'backend = "hardware"\n'
 ANALOGUE = HARDWARE + '[hardware.lasers]\nconnection = "analogue"\n'
 
 
-def _without(extras: tuple[str, ...], argv: list[str]) -> subprocess.CompletedProcess[str]:
-    """The command line where the packages of `extras` cannot be imported."""
+class Done(NamedTuple):
+    """What a command line came to."""
+
+    returncode: int
+    stdout: str
+    stderr: str
+
+
+def _without(extras: Iterable[str], *lines: list[str]) -> list[Done]:
+    """The command lines, in one process, where the packages of `extras` cannot be imported."""
     packages = {package for extra in extras for package in EXTRAS[extra]}
-    code = BLOCKED.format(packages=packages, argv=argv)
-    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    code = BLOCKED.format(packages=packages, lines=lines)
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    return [Done(*each) for each in json.loads(ran.stdout)]
 
 
-def _refused(done: subprocess.CompletedProcess[str], extra: str) -> None:
+def _refused(done: Done | subprocess.CompletedProcess[str], extra: str) -> None:
     assert done.returncode == 2, done
     assert done.stdout == ""
     # a run first says what it is about to do
@@ -47,53 +66,45 @@ def _refused(done: subprocess.CompletedProcess[str], extra: str) -> None:
     assert f"--extra {extra}" in line
 
 
-@pytest.mark.parametrize(
-    ("extra", "argv"),
-    [
-        ("gui", ["gui"]),
-        ("ni", ["emulate"]),
-        ("ni", ["devices", "--server", "localhost:1"]),
-        ("serial", ["devices", "--port", "COM9"]),
-        ("pdf", ["paper", "--only", "modes", "--pdf", "no-such-folder/paper.pdf"]),
-        (
-            "distributed",
-            ["predict", "map", "--omega", "15:17:2", "--beta", "0.3:0.4:2", "--scheduler", "tcp://localhost:1"],
-        ),
-    ],
-)
-def test_a_command_names_the_extra_that_it_needs(extra: str, argv: list[str]) -> None:
-    _refused(_without((extra,), argv), extra)
+def test_without_any_extra_a_command_names_what_it_needs_and_predictions_are_made() -> None:
+    refused = {
+        "gui": ["gui"],
+        "ni": ["emulate"],
+        "pdf": ["paper", "--only", "modes", "--pdf", "no-such-folder/paper.pdf"],
+        "distributed": [
+            *("predict", "map", "--omega", "15:17:2", "--beta", "0.3:0.4:2", "--scheduler", "tcp://localhost:1")
+        ],
+    }
+    steady = ["predict", "steady", "--omega", "16", "--beta", "0.4", "--json"]
+    *found, devices, prediction = _without(EXTRAS, *refused.values(), ["devices", "--json"], steady)
+    for extra, done in zip(refused, found, strict=True):
+        _refused(done, extra)
+    assert (devices.returncode, devices.stderr) == (0, "")
+    content = json.loads(devices.stdout)
+    assert "rocking-bench[ni]" in content["reason"]
+    assert "rocking-bench[serial]" in content["ports_reason"]
+    assert (prediction.returncode, prediction.stderr) == (0, "")
+    assert json.loads(prediction.stdout)["points"]
 
 
 @pytest.mark.parametrize(
-    ("extra", "configuration", "command"),
+    ("extra", "device", "runs"),
     [
-        ("ni", HARDWARE, ["run", "harmonic", "--yes"]),
-        ("ni", ANALOGUE, ["check", "--yes"]),
-        ("serial", HARDWARE, ["check", "--yes"]),
+        ("ni", ["--server", "localhost:1"], [(HARDWARE, ["run", "harmonic"]), (ANALOGUE, ["check"])]),
+        ("serial", ["--port", "COM9"], [(HARDWARE, ["check"])]),
     ],
 )
-def test_a_real_bench_names_the_extra_before_anything_starts(
-    extra: str, configuration: str, command: list[str], tmp_path: Path
+def test_a_real_bench_names_the_one_extra_that_it_lacks_before_anything_starts(
+    extra: str, device: list[str], runs: list[tuple[str, list[str]]], tmp_path: Path
 ) -> None:
-    file, out = tmp_path / "bench.toml", tmp_path / "out"
-    file.write_text(configuration, encoding="utf-8")
-    _refused(_without((extra,), [*command, "--config", str(file), "--out", str(out)]), extra)
+    out, lines = tmp_path / "out", [["devices", *device]]
+    for number, (configuration, command) in enumerate(runs):
+        file = tmp_path / f"{number}.toml"
+        file.write_text(configuration, encoding="utf-8")
+        lines.append([*command, "--yes", "--config", str(file), "--out", str(out)])
+    for done in _without([extra], *lines):
+        _refused(done, extra)
     assert not out.exists()
-
-
-def test_devices_tells_of_what_cannot_be_looked_for() -> None:
-    done = _without(("ni", "serial"), ["devices", "--json"])
-    assert (done.returncode, done.stderr) == (0, "")
-    found = json.loads(done.stdout)
-    assert "rocking-bench[ni]" in found["reason"]
-    assert "rocking-bench[serial]" in found["ports_reason"]
-
-
-def test_without_any_extra_predictions_are_made() -> None:
-    done = _without(tuple(EXTRAS), ["predict", "steady", "--omega", "16", "--beta", "0.4", "--json"])
-    assert (done.returncode, done.stderr) == (0, "")
-    assert json.loads(done.stdout)["points"]
 
 
 def test_the_extras_are_those_of_the_project() -> None:

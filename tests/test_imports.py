@@ -1,38 +1,38 @@
 """Importing the packages stays light: no Qt, no drivers, no compiler, no plotting."""
 
+import json
 import subprocess
 import sys
 
-PACKAGES = "import bench, drivers, sim, protocols"
-HEAVY = {"PySide6", "pyqtgraph", "nidaqmx", "grpc", "serial", "matplotlib", "numba", "scipy", "h5py"}
+import pytest
+
+WINDOW = {"PySide6", "pyqtgraph"}
+PLOTS_AND_DRIVERS = {*WINDOW, "nidaqmx", "grpc", "serial", "matplotlib"}
+HEAVY = {*PLOTS_AND_DRIVERS, "numba", "scipy", "h5py"}
+STAGES = {
+    # numpy's library reads the number of threads once, and its threads compete with the processes
+    "tests.conftest": {"numpy"},
+    "bench, drivers, sim, protocols": HEAVY,
+    "sim.specimen, sim.excitation, bench.config.model": HEAVY,
+    "bench.app.cli.main": WINDOW,
+    "bench.app.session, protocols.harmonic.campaign": PLOTS_AND_DRIVERS,
+}
+"""What must not have been imported when these modules have been, one after the other in one process."""
 
 
-def _run(code: str) -> str:
-    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+@pytest.fixture(scope="module")
+def imported() -> dict[str, set[str]]:
+    """Packages that are imported after each stage."""
+    code = "import json, sys; found = {}\n" + "".join(
+        f"import {modules}; found[{modules!r}] = sorted({{name.partition('.')[0] for name in sys.modules}})\n"
+        for modules in STAGES
+    )
+    code += "print(json.dumps(found))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    return {modules: set(found) for modules, found in json.loads(done.stdout).items()}
 
 
-def test_the_packages_pull_in_nothing_heavy() -> None:
-    loaded = _run(f"import sys; {PACKAGES}; print(*sorted({{name.split('.')[0] for name in sys.modules}}))").split()
-    assert not HEAVY & set(loaded)
-
-
-def test_a_specimen_is_described_without_a_compiler() -> None:
-    loaded = _run("import sys; import sim.specimen, sim.excitation, bench.config.model; print(*sys.modules)").split()
-    assert not HEAVY & {name.split(".")[0] for name in loaded}
-
-
-def test_a_headless_run_needs_no_window_no_driver_and_no_plot_until_its_end() -> None:
-    loaded = _run("import sys; import bench.app.session, protocols.harmonic.campaign; print(*sys.modules)").split()
-    assert not {"PySide6", "pyqtgraph", "nidaqmx", "grpc", "serial", "matplotlib"} & {
-        name.split(".")[0] for name in loaded
-    }
-
-
-def test_the_command_line_starts_without_the_window() -> None:
-    loaded = _run("import sys; import bench.app.cli.main; print(*sys.modules)").split()
-    assert not {"PySide6", "pyqtgraph"} & {name.split(".")[0] for name in loaded}
-
-
-def test_the_number_of_threads_is_set_before_numpy_is_imported() -> None:
-    """By the configuration of the tests: numpy's library reads it once, and its threads compete with the processes."""
-    assert "numpy" not in _run("import sys; import tests.conftest; print(*sys.modules)").split()
+@pytest.mark.parametrize("modules", STAGES)
+def test_an_import_loads_nothing_that_only_a_later_stage_needs(modules: str, imported: dict[str, set[str]]) -> None:
+    assert modules.partition(".")[0].partition(",")[0] in imported[modules]
+    assert not STAGES[modules] & imported[modules]

@@ -1,9 +1,6 @@
-"""The notebooks of docs/notebooks: valid, without outputs, and executed cell by cell in a process each."""
+"""The notebooks of docs/notebooks: valid, without outputs, and executed cell by cell with names of their own."""
 
 import json
-import os
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -11,15 +8,6 @@ import pytest
 
 ROOT = Path(__file__).parent.parent
 NOTEBOOKS = sorted((ROOT / "docs" / "notebooks").glob("*.ipynb"))
-
-RUNNER = """
-import json, sys
-from pathlib import Path
-cells = json.loads(Path(sys.argv[1]).read_text(encoding="utf-8"))["cells"]
-for number, cell in enumerate(cells):
-    if cell["cell_type"] == "code":
-        exec(compile("".join(cell["source"]), f"cell {number}", "exec"), globals())
-"""
 
 
 def _read(path: Path) -> dict[str, Any]:
@@ -59,15 +47,17 @@ def test_a_notebook_is_valid_and_has_no_outputs(path: Path) -> None:
 
 
 @pytest.mark.timeout(400)
+@pytest.mark.usefixtures("shared_results")
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
-def test_a_notebook_runs_from_top_to_bottom(path: Path, folder: Path) -> None:
-    done = subprocess.run(
-        [sys.executable, "-W", "error", "-c", RUNNER, str(path)],
-        cwd=folder,
-        env=os.environ | {"PYTHONPATH": str(ROOT), "MPLBACKEND": "agg"},
-        capture_output=True,
-        text=True,
-        encoding="utf-8",
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr[-2000:]
+def test_a_notebook_runs_from_top_to_bottom(path: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from matplotlib import pyplot
+
+    monkeypatch.chdir(folder)
+    pyplot.switch_backend("agg")
+    names: dict[str, Any] = {"__name__": "__main__"}
+    try:
+        for number, cell in enumerate(_read(path)["cells"]):
+            if cell["cell_type"] == "code":
+                exec(compile("".join(cell["source"]), f"{path.name}, cell {number}", "exec"), names)
+    finally:
+        pyplot.close("all")

@@ -30,8 +30,9 @@ from PySide6.QtWidgets import QApplication
 
 from bench.analysis.signals import SignalMap
 from bench.app.catalogue import all_protocols
+from bench.app.display.theme import LIGHT
 from bench.app.gui.controller import Controller
-from bench.app.gui.palette import LIGHT, dress
+from bench.app.gui.palette import dress
 from bench.app.gui.window import Window
 from bench.app.ipc.broadcast import Reduction
 from bench.app.ipc.messages import Traces
@@ -56,7 +57,7 @@ configuration = configuration_from(None, None)
 from PySide6.QtWidgets import QApplication
 from bench.app.gui.palette import dress
 from bench.app.gui.controller import Controller
-from bench.app.gui.palette import LIGHT
+from bench.app.display.theme import LIGHT
 from bench.app.gui.window import Window
 application = QApplication([])
 dress(application, LIGHT)

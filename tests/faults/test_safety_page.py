@@ -40,7 +40,8 @@ def test_numbers_in_the_text() -> None:
     assert f"`ramps.abort` = {Ramps().abort:g} s" in PAGE
     assert sorted(getattr(Warnings(), name) for name in Warnings.model_fields)[4] == 0.9
     core = sum(place.core for place in PLACES)
-    assert f"{core * len(catalogue())} faults in each run of the test suite" in PAGE
+    assert f"{len(State) * len(catalogue())} faults in each run of the test suite" in PAGE
+    assert f"{core * len(catalogue())} in its long tests" in PAGE
     assert f"{len(PLACES) * len(catalogue())} in `python" in " ".join(PAGE.split())
     assert f"{len(few())} faults once each" in PAGE
     assert f"{len(cases())} in `python" in PAGE

@@ -34,6 +34,9 @@ CHANGED: dict[str, Any] = {
     "options: emulate --device: choices": (
         "usb, crio, cDAQ-9174, cDAQ-9185, cRIO-9045, cRIO-9049, PCIe-6351, USB-6351"
     ),
+    # emulated lasers on network ports, for systems without pseudo-terminals
+    "options: emulate --lasers: choices": "serial, socket, analogue",
+    "options: emulate --lasers: default": "serial; on Windows socket",
     # so are rig backends: those of other packages have names of their own
     "configuration: backend: allowed": "a text",
     # the profile fast has blocks of 5 ms

@@ -6,7 +6,8 @@ A directive is a comment, invisible in the rendered page: `<!-- page: parse, nee
 run        the default: the block is executed
 slow       executed by `python -m tests.pages` only, not in the test suite
 parse      the command lines are checked against the command line's declaration, but not executed; the reason follows
-records    executed where the recorded ground motions are available, otherwise parsed
+records    executed where the recorded ground motions are available, otherwise parsed; `records, slow` by
+           `python -m tests.pages` only
 =========  ==========================================================================================================
 """
 

@@ -73,24 +73,24 @@ Execute = Callable[[list[str], Path], subprocess.CompletedProcess[str]]
 """Executes a command of the program, given its arguments, in a folder."""
 
 
-def failures(block: Block, folder: Path, execute: Execute | None = None) -> Iterator[Failure]:
+def failures(block: Block, folder: Path, *, here: bool = False) -> Iterator[Failure]:
     """Execute a block in `folder`; yields what does not agree with the page.
 
-    Without `execute`, each command of the program is a process of its own.
+    Each command and each Python block is a process of its own or, with `here`, executed in this one.
     """
     if block.language in ("sh", "console"):
         with _servers(block, folder):
             for command in block.commands:
                 if command.arguments[0] == "rockbench" and command.arguments[1] not in SERVERS:
-                    yield from _run(block, command, folder, execute or command_process)
+                    yield from _run(block, command, folder, command_here if here else command_process)
     elif block.language == "toml":
         yield from _parsed(block, tomllib.loads)
     elif block.language == "json":
         yield from _parsed(block, json.loads)
     elif block.language == "python":
-        done = process([sys.executable, "-c", block.text], folder)
-        if done.returncode != 0:
-            yield Failure(block.where, "python", done.stderr.strip().splitlines()[-1])
+        why = _python_here(block.text, folder) if here else _python_process(block.text, folder)
+        if why is not None:
+            yield Failure(block.where, "python", why)
 
 
 def agrees(shown: tuple[str, ...], printed: str) -> bool:
@@ -137,6 +137,20 @@ def command_here(arguments: list[str], folder: Path) -> subprocess.CompletedProc
     with chdir(folder), patch.dict(os.environ, COLUMNS="200"), redirect_stdout(out), redirect_stderr(err):
         code = main(arguments)
     return subprocess.CompletedProcess(arguments, code, out.getvalue(), err.getvalue())
+
+
+def _python_process(text: str, folder: Path) -> str | None:
+    done = process([sys.executable, "-c", text], folder)
+    return done.stderr.strip().splitlines()[-1] if done.returncode else None
+
+
+def _python_here(text: str, folder: Path) -> str | None:
+    with chdir(folder), redirect_stdout(StringIO()), redirect_stderr(StringIO()):
+        try:
+            exec(compile(text, "<page>", "exec"), {"__name__": "__main__"})
+        except Exception as error:
+            return f"{type(error).__name__}: {error}"
+    return None
 
 
 def process(arguments: list[str], folder: Path) -> subprocess.CompletedProcess[str]:

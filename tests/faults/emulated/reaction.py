@@ -1,5 +1,6 @@
 """How fast the guard reacts through the real drivers, in real time: told by the emulated bench, not by the program."""
 
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from typing import Any
 
@@ -21,21 +22,42 @@ _ATTEMPTS = 4
 
 def react_in_real_time(block: int, lead: int, phase: float) -> Reaction:
     """As `tests.faults.reaction.react`; output and motion are those at the terminals of the emulated device."""
+    (reaction,) = reactions_in_real_time(block, lead, [phase])
+    if isinstance(reaction, RigError):
+        raise reaction
+    return reaction
+
+
+def reactions_in_real_time(block: int, lead: int, phases: Sequence[float]) -> Iterator[Reaction | RigError]:
+    """One after the other on one bench; an error where the machine was too late for real time."""
     with Laboratory(VirtualBenchParameters(sample_rate=RATE), Specimen(), seed=1, connection="analogue") as laboratory:
         witness = Witness(laboratory.bench)
         with HardwareRig(laboratory.hardware, lead=lead) as rig:
-            guard = Guard(rig, LIMITS, Ramps())
-            guard.arm()
-            column = [channel.name for channel in rig.channels].index("table_displacement")
-            measured: list[NDArray[np.float64]] = []
-            asked: list[NDArray[np.float64]] = [np.zeros(lead)]
-            while not guard.at_zero:
-                t = (np.arange(len(measured) * block, (len(measured) + 1) * block) - round(phase * block)) / RATE
-                asked.append(np.where(t > 0.0, VOLTS * np.sin(OMEGA * t), 0.0))
-                measured.append(guard.exchange(asked[-1]).values[:, column])
-            hidden: Any = laboratory.daq
-            start: int = hidden._driver.first_tick
-        truth = witness.told()
+            for phase in phases:
+                try:
+                    yield _reaction(rig, witness, laboratory, block, lead, phase)
+                except RigError as error:
+                    rig.stop()
+                    yield error
+
+
+def _reaction(
+    rig: HardwareRig, witness: Witness, laboratory: Laboratory, block: int, lead: int, phase: float
+) -> Reaction:
+    witness.forget()
+    guard = Guard(rig, LIMITS, Ramps())
+    guard.arm()
+    column = [channel.name for channel in rig.channels].index("table_displacement")
+    measured: list[NDArray[np.float64]] = []
+    asked: list[NDArray[np.float64]] = [np.zeros(lead)]
+    while not guard.at_zero:
+        t = (np.arange(len(measured) * block, (len(measured) + 1) * block) - round(phase * block)) / RATE
+        asked.append(np.where(t > 0.0, VOLTS * np.sin(OMEGA * t), 0.0))
+        measured.append(guard.exchange(asked[-1]).values[:, column])
+    hidden: Any = laboratory.daq
+    start: int = hidden._driver.first_tick
+    guard.disarm()
+    truth = witness.told()
     n, begin = len(measured) * block, start - truth.first
     output, moved = truth.output[begin : begin + n], truth.x[begin : begin + n]
     changed = np.flatnonzero(output != np.concatenate(asked)[:n])[0]

@@ -33,6 +33,7 @@ class Witness:
 
     def __init__(self, bench: EmulatedBench) -> None:
         hidden: Any = bench
+        self._bench = hidden
         self.cables: dict[int, Cable] = {}
         self._rows: list[Array] = []
         with hidden.lock:
@@ -52,6 +53,12 @@ class Witness:
         for column, cable in self.cables.items():
             counts[:, column] = cable(counts[:, column])
         return counts
+
+    def forget(self) -> None:
+        """Begin anew with the next tick."""
+        with self._lock:
+            self._rows.clear()
+            self._first = self._bench._counts.end
 
     def told(self) -> Truth:
         """All of it until now."""
