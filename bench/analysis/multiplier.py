@@ -1,0 +1,241 @@
+"""Dominant pair of multipliers of a motion near a periodic motion, from the Fourier coefficients of successive cycles.
+
+Near the periodic motion, the coefficients of cycle n are
+
+    y_n = y* + sum over k of Re(c_k mu_k^n) + noise,
+
+where y*, the vectors c_k, and one or two complex multipliers mu_k are unknown. All are fitted to the whole series at
+once: unlike a regression of each cycle on its predecessor, the fit is not biased by noise of the predecessor. For given
+multipliers the problem is linear, so that only these are iterated (variable projection, Golub and Pereyra, SIAM J.
+Numer. Anal. 10, 1973); the matrix pencil (Hua and Sarkar, IEEE Trans. ASSP 38, 1990) provides their first values.
+"""
+
+from dataclasses import dataclass
+from math import log, pi, tau
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+SHORTEST, TWICE = 16, 24
+"""Smallest number of cycles from which one pair, and two pairs, are determined."""
+
+BOUND = 0.15
+"""Largest deviation of a cycle from the periodic motion, relative to the latter, for which the map is regarded as
+linear.
+"""
+
+EVIDENCE = 20.0
+"""Decrease of the Bayesian information criterion for which a second pair is fitted."""
+
+SIGNIFICANT = 3.0
+"""Smallest norm of a pair's part of the series, relative to that expected of noise alone."""
+
+PENCIL = 3
+"""Number of cycles, divided by the length of the rows of the matrix pencil."""
+
+NEAR, FAR = 2, 6
+"""Frequencies next to that of the pair, in units of 1 / n per cycle, at which the spectrum of the residual is compared
+with its mean. The fit reduces those closer than `NEAR`.
+"""
+
+PASSES = 3
+"""Number of fits, each weighted by the residual of the previous one."""
+
+SMALLEST = 1e-9
+"""Smallest scatter of a coefficient, relative to the norm of the series, in place of that of a series without noise."""
+
+
+@dataclass(frozen=True)
+class Multiplier:
+    """Dominant pair: `modulus` per cycle and `angle` [rad] per cycle, from 0 to pi, with their standard uncertainties
+    due to noise and their correlation.
+
+    `cycles` is the number of cycles used, `pairs` the number of fitted pairs, `autocorrelation` that of the residual
+    from one cycle to the next, and `coloured` the power of the residual near the angle of the pair, relative to its
+    mean. The uncertainties include this factor where it exceeds 1. `residual` is the rms residual of a coefficient, in
+    the unit of the series.
+    """
+
+    modulus: float
+    modulus_uncertainty: float
+    angle: float
+    angle_uncertainty: float
+    correlation: float
+    cycles: int
+    pairs: int
+    autocorrelation: float
+    coloured: float
+    residual: float
+
+
+def linear_part(series: Array, orbit: Array, bound: float = BOUND) -> slice:
+    """Longest run of cycles of `series`, shape (n, m), whose deviation from `orbit`, shape (m,), relative to the norm
+    of the latter, does not exceed `bound`.
+    """
+    within = np.linalg.norm(series - orbit, axis=1) <= bound * float(np.linalg.norm(orbit))
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], within, [False])).astype(np.int8)))
+    if edges.size == 0:
+        return slice(0, 0)
+    begins, ends = edges[::2], edges[1::2]
+    longest = int(np.argmax(ends - begins))
+    return slice(int(begins[longest]), int(ends[longest]))
+
+
+def dominant_multiplier(series: Array) -> Multiplier | None:
+    """Pair with the greatest part in `series`, shape (n, m), of successive cycles at a constant drive.
+
+    None if there are fewer than `SHORTEST` cycles, or if no pair is significant. Raises ValueError for values that are
+    not finite.
+    """
+    if not np.isfinite(series).all():
+        raise ValueError("the series of coefficients has values that are not finite")
+    n = series.shape[0]
+    if n < SHORTEST:
+        return None
+    size = float(np.linalg.norm(series - series.mean(axis=0)))
+    if size == 0.0:
+        return None
+    scaled = (series - series.mean(axis=0)) / size
+    single = _fitted(scaled, 1)
+    if single is None:
+        return None
+    best = single
+    if n >= TWICE and (double := _fitted(scaled, 2)) is not None:
+        # the slower of two pairs must not be the smaller one, since that would be noise
+        slower = abs(double.multipliers[0]) > abs(double.multipliers[1])
+        best = double if slower and double.criterion < single.criterion - EVIDENCE else single
+    return _stated(best, size) if best.significance >= SIGNIFICANT else None
+
+
+@dataclass(frozen=True, eq=False)
+class _Fit:
+    """A fit: its multipliers, the one with the greatest part first, the residual, shape (n, m), the derivatives of the
+    weighted residual, shape (n, m, 2 pairs), with respect to logarithm of modulus and angle of each pair, the weights,
+    shape (m,), the information `criterion`, and the `significance` of the first pair.
+    """
+
+    multipliers: Complex
+    residual: Array
+    slopes: Array
+    weights: Array
+    criterion: float
+    significance: float
+
+
+def _fitted(series: Array, pairs: int) -> _Fit | None:
+    from scipy.optimize import least_squares
+
+    (n, m), first = series.shape, _pencil(series, pairs)
+    if first is None:
+        return None
+    unknowns = np.stack((np.log(np.abs(first)), np.angle(first)), axis=1).ravel()
+    weights = np.ones(m)
+    slopes = np.zeros((n * m, 2 * pairs))
+    for _ in range(PASSES):
+
+        def weighted(values: Array, by: Array = weights) -> Array:
+            return (_left(series, values) * by).ravel()
+
+        found = least_squares(weighted, unknowns, x_scale=np.tile((0.1 / n, 0.1 / n), pairs))
+        unknowns, slopes = np.asarray(found.x, dtype=np.float64), np.asarray(found.jac, dtype=np.float64)
+        free = n - 1 - 2 * pairs
+        scatter = np.sqrt(np.sum(_left(series, unknowns) ** 2, axis=0) / free)
+        weights = 1.0 / np.maximum(scatter, SMALLEST)
+    # two equal multipliers cannot be separated
+    if np.linalg.matrix_rank(slopes) < 2 * pairs:
+        return None
+    parts = _parts(series, unknowns) * weights
+    order = np.argsort(-np.linalg.norm(parts, axis=(1, 2)))
+    residual = _left(series, unknowns)
+    multipliers = np.exp(unknowns[::2] + 1j * unknowns[1::2])
+    criterion = 2.0 * n * float(np.sum(np.log(1.0 / weights))) + 2 * pairs * (1 + m) * log(n * m)
+    # the noise in the part of a pair has two degrees of freedom per coefficient
+    significance = float(np.linalg.norm(parts[order[0]])) / (2.0 * m) ** 0.5
+    slopes = slopes.reshape(n, m, pairs, 2)[:, :, order, :].reshape(n, m, 2 * pairs)
+    return _Fit(multipliers[order], residual, slopes, weights, criterion, significance)
+
+
+def _stated(fit: _Fit, size: float) -> Multiplier:
+    """The dominant pair of `fit`, with its covariance for a residual that is correlated between coefficients."""
+    whitened = fit.residual * fit.weights
+    n, m = whitened.shape
+    free = n - 1 - 2 * fit.multipliers.size
+    between = whitened.T @ whitened / free
+    information = np.tensordot(fit.slopes, fit.slopes, ((0, 1), (0, 1)))
+    correlated = np.tensordot(fit.slopes, np.matmul(between, fit.slopes), ((0, 1), (0, 1)))
+    inverse = np.linalg.inv(information)
+    covariance = inverse @ correlated @ inverse
+    dominant = complex(fit.multipliers[0])
+    coloured = _coloured(whitened, float(np.angle(dominant)))
+    covariance *= max(coloured, 1.0)
+    spread = np.sqrt(np.diag(covariance)[:2])
+    follows = float(np.sum(whitened[1:] * whitened[:-1]) / np.sum(whitened**2))
+    angle = abs(float(np.angle(dominant)))
+    return Multiplier(
+        modulus=abs(dominant),
+        modulus_uncertainty=abs(dominant) * float(spread[0]),
+        angle=angle,
+        angle_uncertainty=float(spread[1]),
+        correlation=float(covariance[0, 1] / np.prod(spread)) * (1.0 if np.angle(dominant) >= 0.0 else -1.0),
+        cycles=n,
+        pairs=fit.multipliers.size,
+        autocorrelation=follows,
+        coloured=coloured,
+        residual=size * float(np.sqrt(np.sum(fit.residual**2) / (free * m))),
+    )
+
+
+def _coloured(whitened: Array, angle: float) -> float:
+    """Power of a residual of unit variance, shape (n, m), near `angle` [rad] per cycle: the noise at other angles has
+    little effect on the pair.
+    """
+    n = whitened.shape[0]
+    away = np.arange(NEAR, FAR + 1, dtype=np.float64)
+    angles: Array = angle + tau / n * np.concatenate((-away, away))
+    spectrum = np.exp(-1j * np.outer(angles, np.arange(n, dtype=np.float64))) @ whitened
+    return float(np.mean(np.abs(spectrum) ** 2) / np.mean(whitened**2) / n)
+
+
+def _columns(n: int, values: Array) -> Array:
+    """Basis of the series, shape (n, 1 + 2 pairs): a constant, and real and imaginary part of each mu^n, scaled to a
+    largest modulus of 1.
+    """
+    rates: Complex = values[::2] + 1j * values[1::2]
+    # a growing pair is scaled at its end, so that no power overflows
+    times: Array = np.arange(n, dtype=np.float64)[:, None] - np.where(np.real(rates) > 0.0, n - 1.0, 0.0)
+    powers: Complex = np.exp(rates * times)
+    pairs = np.stack((np.real(powers), np.imag(powers)), axis=2).reshape(n, -1)
+    return np.concatenate((np.ones((n, 1)), pairs), axis=1)
+
+
+def _left(series: Array, values: Array) -> Array:
+    """Residual of the linear problem for given multipliers, shape (n, m)."""
+    across = np.linalg.qr(_columns(series.shape[0], values)).Q
+    return series - across @ (across.T @ series)
+
+
+def _parts(series: Array, values: Array) -> Array:
+    """Part of each pair in the series, shape (pairs, n, m)."""
+    basis = _columns(series.shape[0], values)
+    found = np.linalg.lstsq(basis, series, rcond=None)[0]
+    pairs = range(1, basis.shape[1], 2)
+    return np.stack([basis[:, k : k + 2] @ found[k : k + 2] for k in pairs])
+
+
+def _pencil(series: Array, pairs: int) -> Complex | None:
+    """First values of the multipliers, in the upper half plane; None if the series does not contain as many pairs."""
+    changes = np.diff(series, axis=0)
+    n = changes.shape[0]
+    length = n // PENCIL
+    rows = np.concatenate([changes[k : n - length + k + 1] for k in range(length)], axis=1)
+    left, _, _ = np.linalg.svd(rows, full_matrices=False)
+    for rank in (2 * pairs, 2 * pairs + 1, 2 * pairs + 2):
+        space = left[:, :rank]
+        found = np.linalg.eigvals(np.linalg.lstsq(space[:-1], space[1:], rcond=None)[0])
+        upper = found[(np.angle(found) > 0.0) & (np.angle(found) < pi)]
+        if upper.size >= pairs:
+            return upper[np.argsort(-np.abs(upper))][:pairs].astype(np.complex128)
+    return None
