@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from bench.comparators.catalogue import solve
 from bench.datafile.tables import Column, Table
+from bench.prediction.conditioning import UNKNOWN, Condition, condition
 from bench.prediction.requests import HistoryRequest
 from bench.prediction.steady import amplitude_of
 from bench.progress import Progress, silent
@@ -40,7 +41,8 @@ QUANTITIES: dict[str, tuple[str, str]] = {
 class History:
     """Motion over time: `values` contains an array of shape (n,) for each of `QUANTITIES`.
 
-    `status` states how the motion ended at `end_time` [s]; `impacts` is the number of impacts until then.
+    `status` states how the motion ended at `end_time` [s]; `impacts` is the number of impacts until then. `condition`
+    is known only for a motion from rest by the solver taylor.
     """
 
     omega: float
@@ -50,6 +52,7 @@ class History:
     end_time: float
     impacts: int
     values: Mapping[str, NDArray[np.float64]]
+    condition: Condition = UNKNOWN
 
     def peak(self, name: str) -> float:
         """Largest absolute value of a sampled quantity; NaN without samples."""
@@ -94,10 +97,27 @@ def runs_table(made: Sequence[History]) -> Table:
     columns = _points(made)
     columns["status"] = Column(np.array([history.status for history in made], np.str_), "", "how the motion ended")
     columns["end_time_s"] = Column(
-        np.array([history.end_time for history in made], np.float64), "s", "time at which the motion ended"
+        np.array([history.condition.rounded_end(history.end_time) for history in made], np.float64),
+        "s",
+        "time at which the motion ended, without the digits that its error makes false",
+    )
+    columns["end_time_error_s"] = Column(
+        np.array([history.condition.end_time_error for history in made], np.float64),
+        "s",
+        "error of the end time: its difference from that of a run at the finest tolerance",
     )
     columns["impacts"] = Column(
         np.array([history.impacts for history in made], np.int64), "1", "number of impacts until the end"
+    )
+    columns["condition_number"] = Column(
+        np.array([history.condition.number for history in made], np.float64),
+        "1",
+        "greatest relative change of the motion per relative change of an input: amplitude, k1, k_C or restitution",
+    )
+    columns["relative_error"] = Column(
+        np.array([history.condition.error for history in made], np.float64),
+        "1",
+        "greatest error of the samples, relative to the greatest magnitude of each state",
     )
     for name in ("u1_m", "drift_m", "theta_rad", "bare_u1_m", "bare_drift_m"):
         unit, description = QUANTITIES[name]
@@ -119,7 +139,8 @@ def _points(made: Sequence[History]) -> dict[str, Column]:
 
 
 def _from_rest(coupled: Specimen, omega: float, amplitude: float, request: HistoryRequest) -> History:
-    drive = SineProgram([Sweep.dwell(request.duration, amplitude, omega)])
+    dwell = Sweep.dwell(request.duration, amplitude, omega)
+    drive = SineProgram([dwell])
     step = tau / omega / request.samples_per_period
     times = np.arange(int(request.duration / step) + 1, dtype=np.float64) * step
     motion, bare = (
@@ -139,6 +160,7 @@ def _from_rest(coupled: Specimen, omega: float, amplitude: float, request: Histo
             _filled(motion.samples, times.size)[:, [0, 1, 4]],
             _filled(bare.samples, times.size)[:, :2],
         ),
+        condition=condition(coupled, dwell, times, motion) if request.solver == "taylor" else UNKNOWN,
     )
 
 

@@ -59,6 +59,8 @@ _HISTORY = {
     "sampled_max_theta_rad": "max theta",
     "impacts": "impacts",
     "end_time_s": "end",
+    "condition_number": "condition",
+    "relative_error": "error",
     "status": "status",
 }
 
