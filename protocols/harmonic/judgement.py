@@ -9,8 +9,8 @@ from bench.analysis.free_motion import FreeMotion, Rate
 from bench.analysis.gain import Gain, SteadyPeak, gain
 from bench.analysis.sensor_accuracy import SensorUncertainty
 from bench.prediction.bands import expanded_uncertainty
+from protocols.common.sine.settling import Held, Settled
 from protocols.harmonic.protocol import HarmonicPoint, PointStatus
-from protocols.harmonic.settling import Held, Settled
 from sim.gain import Branch, predict_gain
 from sim.knowledge import SpecimenKnowledge
 from sim.shaker import Shaker

@@ -9,8 +9,6 @@
 
 from collections.abc import Generator, Mapping, Sequence
 
-import numpy as np
-
 from bench.analysis.cycles import Cycle
 from bench.analysis.gain import steady_peak
 from bench.analysis.running_gain import RunningGain, shared_draws
@@ -20,30 +18,23 @@ from bench.control.oscillator import DriveCalibration, Segment
 from bench.control.sine import Sine
 from bench.control.stabiliser import GROWTH, StabiliserDesign
 from bench.control.starts import Start
-from bench.engine.steps import Arm, Calibrate, Fallen, OperatorAction, Outcome, Publish, RampOut, Step, Sweep
+from bench.engine.steps import Arm, Calibrate, Fallen, Outcome, Publish, RampOut, Step, Sweep
 from bench.events import PointFinished, StepStarted, Warned
 from bench.live_values import Estimate
-from drivers.rig import OperatorTask, RigError
-from protocols.common.calibrate import calibrate_drive, harmonic_frequencies
+from drivers.rig import RigError
+from protocols.common.sine.calibration import NO_BLOCK, REST, bare_calibration, end_test, spring_calibration
+from protocols.common.sine.holding import SLOW, hold, prepared, too_late
+from protocols.common.sine.pace import Pace
+from protocols.common.sine.settling import Held, Report, Settled, checked, linear_frame, settle_and_measure
 from protocols.harmonic.free_prediction import with_free_prediction
-from protocols.harmonic.holding import SLOW, hold, prepared, too_late
 from protocols.harmonic.judgement import Conditions, judge, predicted_fields
-from protocols.harmonic.pace import Pace
 from protocols.harmonic.protocol import HarmonicParameters, HarmonicPoint, PointStatus
-from protocols.harmonic.settling import Held, Report, Settled, checked, linear_frame, settle_and_measure
 from sim.gain import Branch, predict_gain
 from sim.specimen import Specimen
-from sim.steady import Orbit, resting_level
-
-REST = 2.0
-"""Time at rest before a test, in which the signals are zeroed [s]."""
+from sim.steady import Orbit
 
 BARE_CHANGE = 4.0
 """Duration of the sweep between frequencies of the bare frame [s]."""
-
-NO_BLOCK = "storey 1 has a permanent offset although the block was removed: check lasers and specimen"
-
-FALLEN_REQUEST = "The block has fallen: set it upright again."
 
 
 class HarmonicPlan:
@@ -73,17 +64,8 @@ class HarmonicPlan:
         return self._points
 
     def _bare_frame(self) -> Generator[Step, Outcome, DriveCalibration]:
-        yield OperatorAction(
-            OperatorTask.REMOVE_BLOCK, self._specimen.bare(), "Remove the spring and the block from the table."
-        )
-        yield Arm(REST)
-        yield Publish(StepStarted("calibrate the drive, bare frame"))
-        level = self._parameters.calibration_level * self._amplitude
-        above = harmonic_frequencies(max(self._parameters.omega), self._parameters.harmonics)
-        calibration = yield from calibrate_drive((*self._parameters.omega, *above), level, None)
-        if isinstance(calibration, Fallen):
-            raise RigError(NO_BLOCK)
-        yield Calibrate(calibration)
+        bare = self._specimen.bare()
+        calibration = yield from bare_calibration(self._parameters, self._parameters.omega, self._amplitude, bare)
         duration = self._parameters.ramp_time
         for omega in self._parameters.omega:
             yield Publish(StepStarted(f"bare frame at {omega:g} rad/s"))
@@ -106,17 +88,9 @@ class HarmonicPlan:
     def _spring(
         self, specimen: Specimen, plans: Mapping[float, Sequence[Start]], calibration: DriveCalibration
     ) -> Generator[Step, Outcome, None]:
-        request = f"Set the block upright on its base and mount the spring of beta = {specimen.label:g}."
-        yield OperatorAction(OperatorTask.MOUNT_SPRING, specimen, request)
-        yield Arm(REST)
-        yield Publish(StepStarted(f"calibrate the drive, beta = {specimen.label:g}"))
         starts = [start for each in plans.values() for start in each]
-        wanted, level = spring_calibration(self._parameters, specimen, starts)
-        measured = yield from calibrate_drive(wanted, level, calibration)
-        yield from self._end_test(specimen, fast=isinstance(measured, Fallen))
-        if isinstance(measured, DriveCalibration):
-            # far above the frame's modes the block merely adds mass, so the response of the bare frame is used
-            calibration = measured.beyond(calibration)
+        level = self._parameters.calibration_level * self._amplitude
+        calibration = yield from spring_calibration(specimen, self._parameters.omega, starts, level, calibration)
         for omega in self._parameters.omega:
             point = yield from self._point(specimen, omega, calibration, plans[omega])
             self._pace.finished(omega)
@@ -154,9 +128,9 @@ class HarmonicPlan:
                     held = yield from self._hold(specimen, omega, calibration, settled, held_by)
             if not isinstance(settled, Settled):
                 falls += 1
-                yield from self._end_test(specimen, fast=True)
+                yield from end_test(specimen, fast=True)
                 continue
-            yield from self._end_test(specimen, fast=isinstance(held, Fallen))
+            yield from end_test(specimen, fast=isinstance(held, Fallen))
             if isinstance(held, Fallen):
                 held = Held(None, "the block fell")
             known, sensors = self._configuration.known_on_table, self._sensors
@@ -174,12 +148,6 @@ class HarmonicPlan:
         if found is not None:
             return found.model_copy(update={"starts_tried": len(starts)})
         return self._overturned(specimen, omega, falls, starts[0].chance)
-
-    def _end_test(self, specimen: Specimen, *, fast: bool) -> Generator[Step, Outcome, None]:
-        """Ramp out, fast if the block has fallen, and then request that a fallen block be set upright."""
-        outcome = yield RampOut(fast=fast)
-        if fast or isinstance(outcome, Fallen):
-            yield OperatorAction(OperatorTask.STAND_BLOCK_UP, specimen, FALLEN_REQUEST)
 
     def _overturned(self, specimen: Specimen, omega: float, falls: int, chance: float) -> HarmonicPoint:
         bare = self._bare[omega].peak
@@ -286,15 +254,3 @@ class HarmonicPlan:
 def _to_be_held(settled: Settled, design: StabiliserDesign) -> bool:
     """Whether to hold a motion, because it is not steady or its orbit is unstable on the table."""
     return not settled.steadiness.steady or abs(design.cycle_map.slowest) > 1.0
-
-
-def spring_calibration(
-    parameters: HarmonicParameters, specimen: Specimen, starts: Sequence[Start]
-) -> tuple[list[float], float]:
-    """Frequencies [rad/s] and level [m/s2] of the drive calibration with a spring, which leaves the block at rest."""
-    amplitude = parameters.amplitude_factor * specimen.uplift_acceleration
-    omegas = sorted({segment.omega for start in starts for segment in start.segments})
-    grid = np.linspace(omegas[0], omegas[-1], max(round((omegas[-1] - omegas[0]) / 1.5) + 1, 2))
-    wanted = sorted({*(round(float(omega), 2) for omega in grid), *parameters.omega})
-    allowed = 0.6 * min(resting_level(specimen, omega) for omega in wanted)
-    return wanted, min(parameters.calibration_level * amplitude, allowed)

@@ -6,14 +6,15 @@ from typing import Annotated, Literal
 from pydantic import Field, field_validator
 
 from bench.protocol import Axis, Protocol, Reanalysis, RunView, deferred
+from protocols.common.sine.settings import SineParameters
 from sim.parameters import COUPLING, Parameters, each_once, quantity
 
 Frequency = Annotated[float, Field(gt=0, le=40)]
 Stiffness = Annotated[float, Field(gt=0, le=100)]
 
 
-class HarmonicParameters(Parameters):
-    """Steady-state harmonic tests of the bare and the coupled frame; the paper's campaign is the default."""
+class HarmonicPoints(Parameters):
+    """Points of a campaign."""
 
     omega: tuple[Frequency, ...] = quantity(
         (12.5, 15.0, 17.5, 20.0), "rad/s", "circular frequencies of the base motion", min_length=1
@@ -27,43 +28,13 @@ class HarmonicParameters(Parameters):
     amplitude_factor: float = quantity(
         1.01, "1", "amplitude of the table acceleration, relative to the uplift acceleration g/lambda", ge=0.1, le=5
     )
-    amplitude_tolerance: float = quantity(
-        0.001, "1", "largest relative error of the table's amplitude at which a point is measured", gt=0, le=0.1
-    )
-    phase_tolerance: float = quantity(
-        0.00175,
-        "rad",
-        "largest error of the table's phase relative to the oscillator at which a point is measured",
-        gt=0,
-        le=1,
-    )
-    distortion_tolerance: float = quantity(
-        0.01,
-        "1",
-        "largest rms of the table's harmonics, relative to the fundamental, at which a point is measured",
-        gt=0,
-        le=1,
-    )
-    harmonics: int = quantity(10, "1", "highest cancelled harmonic of the table's acceleration; 1: none", ge=1, le=10)
-    calibration_level: float = quantity(
-        0.5,
-        "1",
-        "level of the drive calibration relative to the level of the test; below 1, so that the block stays at rest",
-        gt=0,
-        lt=1,
-    )
-    ramp_time: float = quantity(8.0, "s", "duration of the ramp that starts the bare frame", gt=0, le=120)
-    settle_tolerance: float = quantity(
-        0.002, "1", "largest remaining relative change of a channel that is considered steady", gt=0, le=0.1
-    )
-    settle_limit: float = quantity(240.0, "s", "longest wait for the steady state", gt=0, le=3600)
-    measured_cycles: int = quantity(24, "1", "number of cycles measured at a steady point", ge=4, le=1000)
-    starts: int = quantity(6, "1", "number of starts tried before a point is abandoned", ge=1, le=32)
+
+
+class HarmonicParameters(SineParameters, HarmonicPoints):
+    """Steady-state harmonic tests of the bare and the coupled frame; the paper's campaign is the default."""
+
     hold: bool = quantity(
         True, "", "whether a motion that is unstable or does not become steady is held on its orbit and measured again"
-    )
-    hold_authority: float = quantity(
-        0.1, "1", "largest control of a held motion, relative to the table's amplitude", gt=0, le=0.2
     )
 
 
@@ -236,7 +207,7 @@ PROTOCOL = Protocol(
     point=HarmonicPoint,
     prepare=deferred("protocols.harmonic.campaign:HarmonicCampaign"),
     figures=("gain_spectra.png",),
-    events=("protocols.harmonic.holding:HoldCycle",),
+    events=("protocols.common.sine.holding:HoldCycle",),
     reanalysis=Reanalysis(HarmonicSettings, deferred("protocols.harmonic.reanalysis:HarmonicFollower")),
     report=deferred("protocols.harmonic.report:harmonic_sections"),
     view=RunView(

@@ -18,10 +18,7 @@ from bench.datafile.reader import DataFile
 from bench.engine.steps import Arm, Calibrate, Dwell, Measured, Outcome, Publish, SetHarmonics, Step, Sweep
 from bench.events import Acquired, Event, PointFinished, StepStarted
 from bench.live_values import Estimate
-from protocols.harmonic.free_prediction import with_free_prediction
-from protocols.harmonic.judgement import Conditions, judge, predicted_fields
-from protocols.harmonic.protocol import HarmonicParameters, HarmonicPoint, HarmonicSettings, PointStatus
-from protocols.harmonic.settling import (
+from protocols.common.sine.settling import (
     JUDGED,
     LASERS,
     TRANSIENT,
@@ -31,6 +28,9 @@ from protocols.harmonic.settling import (
     linear_frame,
     preceding,
 )
+from protocols.harmonic.free_prediction import with_free_prediction
+from protocols.harmonic.judgement import Conditions, judge, predicted_fields
+from protocols.harmonic.protocol import HarmonicParameters, HarmonicPoint, HarmonicSettings, PointStatus
 from sim.gain import predict_gain
 
 

@@ -14,7 +14,7 @@ from bench.figures.map_figure import MapPoint
 from bench.figures.spectra_figure import gain_spectra
 from bench.prediction.bands import expanded_uncertainty
 from protocols.common.budgets import budget_parts, budgeted
-from protocols.harmonic.holding import HoldCycle
+from protocols.common.sine.holding import HoldCycle
 from protocols.harmonic.report_cycles import Dwells, MeasuredMotion, measured_figure
 from protocols.harmonic.report_hold import hold_figure
 from sim.errors import InvalidInput

@@ -18,7 +18,7 @@ WIDTH, HEIGHT = 7.5, 4.6
 def hold_figure(cycles: Mapping[str, Sequence[Any]], omega: float, beta: float) -> "Figure":
     """Peak drift (above) and control (below) of each cycle of the hold at `omega` [rad/s] and `beta`.
 
-    `cycles` are the columns of `protocols.harmonic.holding.HoldCycle`.
+    `cycles` are the columns of `protocols.common.sine.holding.HoldCycle`.
     """
     here = [k for k, at in enumerate(zip(cycles["omega"], cycles["beta"], strict=True)) if at == (omega, beta)]
     number, drift, control = (np.array([cycles[name][k] for k in here]) for name in ("cycle", "drift_peak", "control"))

@@ -30,11 +30,11 @@ from bench.analysis.sensor_accuracy import SensorUncertainty
 from bench.analysis.steady import Steadiness, SteadyDetector
 from bench.analysis.table_motion import table_motion, with_final_rest
 from bench.config.model import BenchConfiguration
+from protocols.common.sine.settling import INTERVAL, JUDGED, LASERS, SHORTEST, TRANSIENT, Settled
 from protocols.earthquake.measurement import observe
 from protocols.earthquake.uncertainty import drift_errors
 from protocols.harmonic.judgement import Conditions, judge
 from protocols.harmonic.protocol import HarmonicParameters, HarmonicPoint, PointStatus
-from protocols.harmonic.settling import INTERVAL, JUDGED, LASERS, SHORTEST, TRANSIENT, Settled
 from sim.excitation import SampledRecord
 from sim.gain import predict_gain
 from sim.linear import steady_response

@@ -11,7 +11,7 @@ from matplotlib.testing.compare import compare_images
 
 from bench.datafile.reader import open_datafile
 from bench.figures.style import write_figure
-from protocols.harmonic.holding import HoldCycle
+from protocols.common.sine.holding import HoldCycle
 from protocols.harmonic.report_hold import hold_figure
 from tests.pages.blocks import ROOT
 from tests.pages.execute import process

@@ -22,9 +22,10 @@ from bench.guard.motion import MotionWatch
 from bench.guard.quantities import WatchedQuantities
 from bench.preflight.demands import response_of, stage_travels
 from bench.preflight.margins import Demand
+from protocols.common.sine.demands import Trial
 from protocols.harmonic import campaign
 from protocols.harmonic.campaign import HarmonicCampaign
-from protocols.harmonic.forecast import Trial, trials
+from protocols.harmonic.forecast import trials
 from protocols.harmonic.protocol import HarmonicParameters
 from sim.gain import predict_gain
 from sim.linear import steady_response

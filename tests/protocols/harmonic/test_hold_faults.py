@@ -13,8 +13,8 @@ from bench.engine.interface import Ending
 from bench.events import Acquired, Event, LimitExceeded, PointFinished
 from drivers.rig import Counts
 from drivers.simulated import SimulatedRig
+from protocols.common.sine.holding import HoldCycle
 from protocols.harmonic.campaign import HarmonicCampaign
-from protocols.harmonic.holding import HoldCycle
 from protocols.harmonic.protocol import HarmonicParameters, HarmonicPoint, PointStatus
 from sim.specimen import Specimen
 from tests.recorded import recorded

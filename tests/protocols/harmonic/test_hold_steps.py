@@ -16,12 +16,12 @@ from bench.control.sine import Sine
 from bench.control.stabiliser import DELAY, StabiliserDesign
 from bench.engine.steps import Done, Dwell, Measured, Outcome, Publish, SetHarmonics, Step
 from bench.events import StepStarted
-from protocols.harmonic import holding
+from protocols.common.sine import holding
+from protocols.common.sine.holding import HoldCycle, hold, prepared, too_late
+from protocols.common.sine.settling import Held, TableState
 from protocols.harmonic.campaign import HarmonicCampaign
 from protocols.harmonic.forecast import trials
-from protocols.harmonic.holding import HoldCycle, hold, prepared, too_late
 from protocols.harmonic.protocol import HarmonicParameters
-from protocols.harmonic.settling import Held, TableState
 from sim.cycle_map import CycleMap
 from sim.gain import predict_gain
 from sim.specimen import Specimen

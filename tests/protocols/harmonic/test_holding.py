@@ -9,7 +9,7 @@ import pytest
 
 from bench.app.cli.main import main
 from bench.datafile.reader import open_datafile
-from protocols.harmonic.holding import HoldCycle
+from protocols.common.sine.holding import HoldCycle
 
 pytestmark = pytest.mark.usefixtures("shared_results")
 

@@ -10,9 +10,9 @@ from bench.analysis.free_motion import FreeMotion, Rate
 from bench.analysis.gain import SensorAccuracy, SteadyPeak
 from bench.analysis.sensor_accuracy import PeakReadings, SensorUncertainty
 from bench.analysis.steady import Steadiness
+from protocols.common.sine.settling import Settled
 from protocols.harmonic.judgement import Conditions, judge
 from protocols.harmonic.protocol import HarmonicPoint, PointStatus
-from protocols.harmonic.settling import Settled
 from sim.gain import predict_gain
 from sim.knowledge import SpecimenKnowledge
 from sim.shaker import Shaker

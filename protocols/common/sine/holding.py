@@ -17,8 +17,8 @@ from bench.control.sine import Sine, SineControl, SineResponse, Tolerance
 from bench.control.stabiliser import BLEND, DELAY, HoldMonitor, Stabiliser, StabiliserDesign, observed
 from bench.engine.steps import Dwell, Fallen, Measured, Outcome, Publish, SetHarmonics, Step
 from bench.events import Event, StepStarted, event
-from protocols.harmonic.protocol import HarmonicParameters
-from protocols.harmonic.settling import (
+from protocols.common.sine.settings import SineParameters
+from protocols.common.sine.settling import (
     AIM,
     INTERVAL,
     JUDGED,
@@ -100,7 +100,7 @@ def hold(
     design: StabiliserDesign,
     beta: float,
     largest: float,
-    parameters: HarmonicParameters,
+    parameters: SineParameters,
     accuracy: SensorAccuracy,
     report: Report,
 ) -> Generator[Step, Outcome, Held | Fallen]:
@@ -109,8 +109,24 @@ def hold(
     `largest` [m] is the largest peak drift allowed. The amplitude control is inactive while the motion is captured;
     then it corrects the shares to which the control of the hold is added.
     """
-    run = _Hold(sine, table, design, largest, parameters, accuracy)
-    phase: float | None = design.cycle_map.phase
+    run = Hold(sine, table, design, largest, parameters, accuracy)
+    held = yield from capture_and_measure(run, beta, report)
+    if isinstance(held, Fallen) or held.peak is None:
+        return held
+    first, *others = run.shares
+    kicked = (first + KICK * design.cycle_map.sensitive / table.answer, *others)
+    yield SetHarmonics(kicked, run.monitor.cycles + 1, BLEND)
+    yield SetHarmonics(run.shares, run.monitor.cycles + 2, BLEND)
+    free = yield from _released(sine, beta, held.peak.drift, largest, run.monitor.cycles)
+    return free if isinstance(free, Fallen) else replace(held, rate=free)
+
+
+def capture_and_measure(run: "Hold", beta: float, report: Report) -> Generator[Step, Outcome, Held | Fallen]:
+    """Capture the orbit from the present motion, correct the table, and measure the held motion.
+
+    Afterwards the control of the last cycle is still in effect, unless the hold was released for the stated reason.
+    """
+    phase: float | None = run.design.cycle_map.phase
     while True:
         outcome = yield Dwell(1, phase)
         phase = None
@@ -120,7 +136,7 @@ def hold(
             reason = run.push(cycle)
             if not np.isfinite(run.command[0]):
                 reason = "the estimate of the deviation is not finite"
-            yield Publish(HoldCycle(sine.omega, beta, run.monitor.cycles, *run.last))
+            yield Publish(HoldCycle(run.sine.omega, beta, run.monitor.cycles, *run.last))
             if reason is not None:
                 yield SetHarmonics(run.shares)
                 return Held(None, reason, captured=run.monitor.captured_after, cycles=run.monitor.cycles)
@@ -128,12 +144,7 @@ def hold(
         if run.monitor.cycles % INTERVAL == 0 and run.recent:
             yield from report(list(run.recent))
         if (held := run.measured()) is not None and held.peak is not None:
-            first, *others = run.shares
-            kicked = (first + KICK * design.cycle_map.sensitive / table.answer, *others)
-            yield SetHarmonics(kicked, run.monitor.cycles + 1, BLEND)
-            yield SetHarmonics(run.shares, run.monitor.cycles + 2, BLEND)
-            free = yield from _released(sine, beta, held.peak.drift, largest, run.monitor.cycles)
-            return free if isinstance(free, Fallen) else replace(held, rate=free)
+            return held
 
 
 def _released(
@@ -163,7 +174,7 @@ def _rate(cycles: list[Cycle]) -> Rate | None:
     return free_motion(cycles).rate if cycles else None
 
 
-class _Hold:
+class Hold:
     """State of a hold between two cycles."""
 
     def __init__(
@@ -172,10 +183,11 @@ class _Hold:
         table: TableState,
         design: StabiliserDesign,
         largest: float,
-        parameters: HarmonicParameters,
+        parameters: SineParameters,
         accuracy: SensorAccuracy,
     ) -> None:
-        self._sine, self._table, self._parameters = sine, table, parameters
+        self.sine, self.design = sine, design
+        self._table, self._parameters = table, parameters
         self._stabiliser = Stabiliser(design, parameters.hold_authority)
         self.monitor = HoldMonitor(parameters.hold_authority, PATIENCE, largest, table.answer)
         tolerances = (parameters.amplitude_tolerance, parameters.phase_tolerance, parameters.distortion_tolerance)
@@ -210,7 +222,7 @@ class _Hold:
         drift = float(cycle.extreme[DRIFT])
         self.last = (drift, self._stabiliser.deviation, abs(control))
         self.recent.append(cycle)
-        reason = self.monitor.push(control, drift, *self._sine.fundamentals(cycle, self._table.turn))
+        reason = self.monitor.push(control, drift, *self.sine.fundamentals(cycle, self._table.turn))
         if reason is None and self.monitor.captured_after is not None:
             reason = self._settle(cycle, abs(control))
         return reason
@@ -225,7 +237,7 @@ class _Hold:
         self._used.append((cycle, control))
         self._detector.push(cycle)
         if self._since == INTERVAL and self._updates < UPDATES:
-            response = SineResponse.of([each for each, _ in self._used], self._sine, self._table.turn)
+            response = SineResponse.of([each for each, _ in self._used], self.sine, self._table.turn)
             shares = self._control.next(response)
             if shares is not None:
                 self.shares = shares
@@ -235,17 +247,22 @@ class _Hold:
                 self._detector.restart()
         return None
 
+    @property
+    def used(self) -> list[Cycle]:
+        """The measured cycles."""
+        return [cycle for cycle, _ in self._used][-self._parameters.measured_cycles :]
+
     def measured(self) -> Held | None:
         """The held motion; None until the table's motion is a sine and enough cycles are steady."""
         if len(self._used) < self._wanted:
             return None
         if not self._detector.judge(allowance=2.0).steady:
             return None
-        used = [cycle for cycle, _ in self._used][-self._parameters.measured_cycles :]
-        table = SineResponse.of(used, self._sine, self._table.turn)
+        used = self.used
+        table = SineResponse.of(used, self.sine, self._table.turn)
         controls = np.array([control for _, control in self._used])[-self._parameters.measured_cycles :]
         return Held(
-            peak=steady_peak(used, self._sine.omega),
+            peak=steady_peak(used, self.sine.omega),
             amplitude_error=table.amplitude_error,
             phase_error=table.phase_error,
             updates=self._updates,

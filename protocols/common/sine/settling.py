@@ -16,7 +16,7 @@ from bench.config.model import BenchConfiguration
 from bench.control.sine import Sine, SineControl, SineResponse, Tolerance
 from bench.engine.steps import Dwell, Fallen, Measured, Outcome, SetHarmonics, Step
 from protocols.common.calibrate import need_cycles
-from protocols.harmonic.protocol import HarmonicParameters
+from protocols.common.sine.settings import SineParameters
 
 INTERVAL = 6
 """Number of cycles between checks of the table's motion and of steadiness."""
@@ -101,7 +101,7 @@ Report = Callable[[list[Cycle]], Generator[Step, Outcome, None]]
 
 def settle_and_measure(
     sine: Sine,
-    parameters: HarmonicParameters,
+    parameters: SineParameters,
     accuracy: SensorAccuracy,
     report: Report,
     frame: LinearFrame | None = None,
