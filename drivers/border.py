@@ -251,8 +251,8 @@ class CheckedRig:
         for column, channel in enumerate(self.channels):
             span = np.iinfo(channel.storage)
             if low[column] < span.min or high[column] > span.max:
-                told = f"from {low[column]} to {high[column]} of {channel.name}, which are stored in {span.bits} bits"
-                self._refuse(f"returned counts {told}")
+                found = f"from {low[column]} to {high[column]} of {channel.name}, which are stored in {span.bits} bits"
+                self._refuse(f"returned counts {found}")
 
 
 _NONE: tuple[()] = ()

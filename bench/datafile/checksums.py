@@ -193,8 +193,8 @@ def integrity(entry: hdf5.Group, largest: int | None = SMALL, done: Done = lambd
         try:
             stored = hdf5.dataset(entry, path)
             looked = bool(values) and (largest is None or stored.nbytes <= largest)
-            if told := _compared(stored, values if looked else "", attributes):
-                failing[path] = told
+            if changes := _compared(stored, values if looked else "", attributes):
+                failing[path] = changes
             elif not looked:
                 unchecked.append(path)
         except UNREADABLE as error:
@@ -220,12 +220,12 @@ def added(entry: hdf5.Group) -> Iterator[str]:
 
 
 def _compared(stored: hdf5.Dataset, values: str, attributes: str) -> str:
-    told: list[str] = []
+    found: list[str] = []
     if of_attributes(stored) != attributes:
-        told.append(f"the attributes of {stored.name} were changed")
+        found.append(f"the attributes of {stored.name} were changed")
     if values and of_values(stored) != values:
-        told.append(f"{stored.name} was changed: its checksum is wrong")
-    return "; ".join(told)
+        found.append(f"{stored.name} was changed: its checksum is wrong")
+    return "; ".join(found)
 
 
 def _lost(entry: hdf5.Group, path: str, error: BaseException) -> str:

@@ -108,8 +108,8 @@ def field_of(name: str, stored: hdf5.Dataset) -> Field:
     """The field that a dataset stores."""
     with reading(stored.name):
         attrs = stored.attrs
-        unit, told = str(attrs.get("units", "")), str(attrs["description"])
-        return Field(name, Kind(attrs["kind"]), unit, told, bool(attrs["optional"]))
+        unit, description = str(attrs.get("units", "")), str(attrs["description"])
+        return Field(name, Kind(attrs["kind"]), unit, description, bool(attrs["optional"]))
 
 
 def fields_from(declared: Any) -> tuple[Field, ...]:

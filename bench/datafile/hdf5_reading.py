@@ -235,10 +235,10 @@ def _member_or_target(parent: Group, name: str, read_only: bool = False) -> "Dat
 
 
 def _record_loss(path: str, error: BaseException, lost: dict[str, str] | None) -> list[str]:
-    told = f"{path} cannot be read ({reason(error)})"
+    message = f"{path} cannot be read ({reason(error)})"
     if lost is None:
-        raise DataFileError(f"{told}: the file is damaged") from error
-    lost[path] = told
+        raise DataFileError(f"{message}: the file is damaged") from error
+    lost[path] = message
     return []
 
 

@@ -106,8 +106,8 @@ def _opened(path: Path, judging: bool) -> hdf5.File:
     except UNREADABLE as error:
         if not hdf5.is_hdf5(path):
             raise InvalidInput("record", str(path), "this is not an HDF5 file") from error
-        told = f"{path} cannot be read ({reason(error)}): another program has locked it, or it is damaged; {_HINT}"
-        raise DataFileError(told) from error
+        message = f"{path} cannot be read ({reason(error)}): another program has locked it, or it is damaged; {_HINT}"
+        raise DataFileError(message) from error
 
 
 def _rehearse(path: Path) -> None:
@@ -141,8 +141,8 @@ def _check_format(path: Path, file: hdf5.File, kinds: tuple[str, ...]) -> None:
         check_attributes(file, "/")
         found = {name: file.attrs[name] for name in ("format", "format_version") if name in file.attrs}
     except UNREADABLE as error:
-        told = f"{path} is damaged: the attributes of / cannot be read ({reason(error)}); {_HINT}"
-        raise DataFileError(told) from error
+        message = f"{path} is damaged: the attributes of / cannot be read ({reason(error)}); {_HINT}"
+        raise DataFileError(message) from error
     kind = str(found.get("format"))
     if kind not in _VERSIONS or "format_version" not in found:
         raise InvalidInput("record", str(path), "this is an HDF5 file, but not a data file of rocking-bench")
@@ -151,8 +151,8 @@ def _check_format(path: Path, file: hdf5.File, kinds: tuple[str, ...]) -> None:
     except (TypeError, ValueError):
         version = 0
     if version < 1:
-        told = f"its format version {found['format_version']!r} is invalid: the file is damaged"
-        raise InvalidInput("record", str(path), told)
+        message = f"its format version {found['format_version']!r} is invalid: the file is damaged"
+        raise InvalidInput("record", str(path), message)
     if version > _VERSIONS[kind]:
         raise InvalidInput("record", str(path), f"its format version {version} is newer: update this software")
     if kind not in kinds:

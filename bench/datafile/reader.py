@@ -52,8 +52,8 @@ def open_datafile(path: Path, *, judging: bool = False) -> "DataFile":
     except BaseException as error:
         file.close()
         if isinstance(error, UNREADABLE):
-            told = f"{path} is damaged: {reason(error)}; `rockbench file recover` restores the readable part"
-            raise DataFileError(told) from error
+            message = f"{path} is damaged: {reason(error)}; `rockbench file recover` restores the readable part"
+            raise DataFileError(message) from error
         raise
 
 

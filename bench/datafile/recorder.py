@@ -177,8 +177,8 @@ class Recorder:
 
     def _stop_recording(self, how: str) -> None:
         """Note that the disk is too slow: pending data are still written if it recovers, new data are ignored."""
-        told = f"recording to {self.path} has stopped because its disk {how}: earlier data are readable; check the disk"
-        self._behind = self._behind or DataFileError(told)
+        why = f"recording to {self.path} has stopped because its disk {how}: earlier data are readable; check the disk"
+        self._behind = self._behind or DataFileError(why)
 
     def _checked(self, event: Acquired) -> _Block:
         """Transposed copies of the block's arrays: a driver may reuse its buffer."""
@@ -231,9 +231,9 @@ class Recorder:
             work()
         except Exception as error:
             # any failure must end the run, because an unrecorded campaign is worthless
-            told = in_use(error) if is_held(error) else reason(error)
+            message = in_use(error) if is_held(error) else reason(error)
             failure = DataFileError(
-                f"{self.path} cannot be written any further ({told}): check the disk, then start a new run"
+                f"{self.path} cannot be written any further ({message}): check the disk, then start a new run"
             )
             failure.__cause__ = error
             self._failure = failure

@@ -73,9 +73,9 @@ def _beyond(
         except UNREADABLE as error:
             raise DataFileError(f"the journal has no {name} for {table.name}: it is damaged") from error
         if compared is None or name in compared:
-            told = values[: len(known)]
+            early = values[: len(known)]
             # JSON has no NaN or infinity: a number that is absent from the journal counts as equal
-            same = (told == known[: len(told)]) | ((told != told) if told.dtype.kind == "f" else False)
+            same = (early == known[: len(early)]) | ((early != early) if early.dtype.kind == "f" else False)
             if not np.all(same):
                 raise DataFileError(f"journal and file differ in {stored.name}: it is the journal of another file")
         new.append((stored, values[len(known) :]))
@@ -118,24 +118,24 @@ def write_ends(record: DataFile, path: Path, entry: hdf5.Group, lengths: Mapping
     """
     complete, status, summary, end_time = create_ends(entry, tuple(record.counted))
     complete[...] = [lengths.get(name, 0) for name in record.counted]
-    was, told, end = (_text(record, name) for name in ("status", "summary", "end_time"))
+    was, why, end = (_text(record, name) for name in ("status", "summary", "end_time"))
     if was not in [each.value for each in Status] or was == Status.RUNNING:
         # the time of the crashed writer's last known activity
         end = datetime.fromtimestamp(path.stat().st_mtime).astimezone().isoformat(timespec="milliseconds")
-        was, told = Status.INTERRUPTED, "the recording ended without being closed; recovered from the data on the disk"
-        told += f", without {loss}" if loss else ""
+        was, why = Status.INTERRUPTED, "the recording ended without being closed; recovered from the data on the disk"
+        why += f", without {loss}" if loss else ""
     elif loss:
-        told = f"part of the file was lost: {loss}; the campaign had ended as {was}" + (f": {told}" if told else "")
+        why = f"part of the file was lost: {loss}; the campaign had ended as {was}" + (f": {why}" if why else "")
         was = Status.INTERRUPTED
     for stored, text, width in zip(
-        (status, summary, end_time), (was, told, end), (STATUS_WIDTH, SUMMARY_WIDTH, TIME_WIDTH), strict=True
+        (status, summary, end_time), (was, why, end), (STATUS_WIDTH, SUMMARY_WIDTH, TIME_WIDTH), strict=True
     ):
         hdf5.replace_text(stored, text, width)
 
 
 def write_note(record: DataFile, path: Path, entry: hdf5.Group, result: Recovery) -> None:
     """Add a note on the recovery, and one on each damaged object."""
-    told = (
+    recovered = (
         f"from {path.name} of format {record.format_version}: {result.rows} samples per channel kept,"
         f" {result.loss or 'no rows'} lost, {result.from_journal} events and {result.points_from_journal} points from"
         " the journal"
@@ -143,7 +143,7 @@ def write_note(record: DataFile, path: Path, entry: hdf5.Group, result: Recovery
     before = [f"damaged before: {each}" for each in result.damage]
     note = hdf5.create_group(entry, NOTE, "NXnote")
     hdf5.write_text(note, "date", now())
-    hdf5.write_text(note, "description", "\n".join([*record.recoveries, told, *before]))
+    hdf5.write_text(note, "description", "\n".join([*record.recoveries, recovered, *before]))
 
 
 def _text(record: DataFile, path: str) -> str:
@@ -193,8 +193,8 @@ def _rebuild(record: DataFile, path: Path, temporary: Path, target: Path, progre
         lines = list(read_journal(journal_path(path)))
         renew_tables(entry, copying.lost, record.own_tables, lines)
         cut(entry, copying.counted)
-        gone = {at: told for at, told in copying.lost.items() if not _is_renewed(at)}
-        damage = gone | {at: told for at, told in judged.failing.items() if not _is_renewed(at)}
+        gone = {at: damaged for at, damaged in copying.lost.items() if not _is_renewed(at)}
+        damage = gone | {at: damaged for at, damaged in judged.failing.items() if not _is_renewed(at)}
         events = points = 0
         try:
             events, points = add_lost_events(entry, lines)
@@ -205,7 +205,7 @@ def _rebuild(record: DataFile, path: Path, temporary: Path, target: Path, progre
         lengths = {parts[at]: rows for at, rows in grown.items()}
         lost = {part: left for part, rows in copying.counted.items() if (left := rows - lengths.get(part, 0)) > 0}
         # a truncated dataset differs from its checksum, but its loss has already been reported
-        damage = {at: told for at, told in damage.items() if at not in grown or parts[at] not in lost}
+        damage = {at: damaged for at, damaged in damage.items() if at not in grown or parts[at] not in lost}
         _fill_plot(entry, lengths["samples"])
         result = Recovery(target, lengths["samples"], events, points, lost, tuple(damage.values()))
         write_ends(record, path, entry, lengths, "; ".join(filter(None, (result.loss, *gone.values()))))

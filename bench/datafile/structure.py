@@ -116,8 +116,8 @@ class _Judge:
                 raise DataFileError(f"{path} has chunks of {chunk} bytes; at most {LARGEST_CHUNK} are allowed")
         self._values += int(stored.nbytes)
         if self._values > UNPACKED * self._size + SPARE:
-            told = f"the datasets up to {path} declare {self._values} bytes of values in a file of {self._size} bytes"
-            raise DataFileError(f"{told}: it is truncated or invalid")
+            claim = f"the datasets up to {path} declare {self._values} bytes of values in a file of {self._size} bytes"
+            raise DataFileError(f"{claim}: it is truncated or invalid")
 
     def _view(self, made: Any, path: str) -> None:
         """Check that a view refers to this file and is in the group for views."""

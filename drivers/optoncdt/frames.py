@@ -53,9 +53,9 @@ def layout_in(who: str, reported: list[str], signals: tuple[str, ...]) -> Layout
     values = _values(tuple(reported))
     needed = _values(signals)
     if not values or not values[0].startswith("DIST") or any(values.count(value) != 1 for value in needed):
-        told, sent = ", ".join(signals).lower(), " ".join(reported) or "nothing"
+        message, sent = ", ".join(signals).lower(), " ".join(reported) or "nothing"
         raise RigError(
-            f"{who} sends {sent} instead of distance, {told};"
+            f"{who} sends {sent} instead of distance, {message};"
             " its firmware is not supported: update it, or use the analogue output"
         )
     time = (values.index("TIMESTAMP_LO"), values.index("TIMESTAMP_HI")) if "TIMESTAMP" in signals else None

@@ -103,8 +103,8 @@ def _serve(who: str, name: str, baud: int, commands: IO[bytes], frames: IO[bytes
         pending.put((str(error).encode(), nan))
     except Exception as error:
         # the library raises various errors when a port disappears
-        told = f"{who} was disconnected ({error}); plug it in, check its power, and reopen it"
-        pending.put((told.encode(), nan))
+        message = f"{who} was disconnected ({error}); plug it in, check its power, and reopen it"
+        pending.put((message.encode(), nan))
     finally:
         pending.put(None)
         writer.join()

@@ -59,8 +59,8 @@ def open_port(name: str, port: str, baud: int) -> Serial:
         try:
             return cast(Serial, SocketPort(port, baud, timeout=_READ_TIMEOUT, write_timeout=_WRITE_TIMEOUT))
         except _PORT_ERRORS as error:
-            told = "check the address, and that the device server is switched on and has no other client"
-            raise DeviceNotFound(f"{name} cannot be opened: {port} does not respond ({error}); {told}") from error
+            message = "check the address, and that the device server is switched on and has no other client"
+            raise DeviceNotFound(f"{name} cannot be opened: {port} does not respond ({error}); {message}") from error
     try:
         opened = Serial(port, baud, timeout=_READ_TIMEOUT, write_timeout=_WRITE_TIMEOUT, exclusive=True)
     except _PORT_ERRORS as error:

@@ -155,7 +155,9 @@ def _margins(margins: "tuple[Margin, ...]") -> str:
 
 def tests_text(tests: "Sequence[Queued]") -> str:
     """One line for each test, and the number of tests at each stage."""
-    rows = [(str(n + 1), str(test.stage), test.protocol, test.out or ABSENT, test.told) for n, test in enumerate(tests)]
+    rows = [
+        (str(n + 1), str(test.stage), test.protocol, test.out or ABSENT, test.outcome) for n, test in enumerate(tests)
+    ]
     counted = {stage: sum(test.stage == stage for test in tests) for stage in dict.fromkeys(t.stage for t in tests)}
     said = ", ".join(f"{number} {stage}" for stage, number in counted.items()) or "no tests"
     return f"{text_table(_TESTS, rows)}\n{said}."

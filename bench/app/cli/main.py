@@ -234,10 +234,10 @@ def unreadable(error: BaseException) -> str:
     """Message for an unexpected error while a file is read, with its location in the source code."""
     frame = traceback.extract_tb(error.__traceback__)[-1]
     said = " ".join(str(error).split())
-    told = f"{type(error).__name__}{': ' if said else ''}{said:.200}"
+    what = f"{type(error).__name__}{': ' if said else ''}{said:.200}"
     place = f"{Path(frame.filename).name}, line {frame.lineno}"
     return (
-        f"the contents of the file cannot be evaluated ({told}; {place}): check the file with `rockbench file verify`"
+        f"the contents of the file cannot be evaluated ({what}; {place}): check the file with `rockbench file verify`"
     )
 
 

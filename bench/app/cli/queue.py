@@ -122,7 +122,7 @@ def _run_one(
     test = tests.tests[index]
     interrupted: int | None = None
     out: Path | None = None
-    good, told = False, "the program failed"
+    good, outcome = False, "the program failed"
     try:
         each = checked or ready(test, index + 1, configuration)
         if test.out is not None:
@@ -135,26 +135,26 @@ def _run_one(
             each.protocol, lambda _progress: each.prepared, out, operator, realtime=test.realtime, about=test.about
         )
         if isinstance(ended, Exception):
-            told = f"failed: {ended}"
+            outcome = f"failed: {ended}"
         else:
             good = ended.status in GOOD and ended.passed
-            told = (
+            outcome = (
                 f"{ended.status}: {ended.reason}" if ended.passed else f"{ended.status}, but at least one check failed"
             )
             if ended.status == "completed" and good:
                 return None
     except InvalidInput as refused:
-        told = f"refused: {refused}"
+        outcome = f"refused: {refused}"
     except KeyboardInterrupt as interrupt:
-        told, interrupted = str(interrupt) or "interrupted", 130
+        outcome, interrupted = str(interrupt) or "interrupted", 130
     finally:
-        tests.finish(index, good=good, told=told)
+        tests.finish(index, good=good, outcome=outcome)
         if out is not None and test.out is None:
             remove_unused(out)
     if interrupted is None:
-        print_error(f"test {index + 1} {told}")
+        print_error(f"test {index + 1} {outcome}")
     else:
-        report_interrupt(f"test {index + 1} {told}", in_result=True)
+        report_interrupt(f"test {index + 1} {outcome}", in_result=True)
     return interrupted or 1
 
 

@@ -133,7 +133,7 @@ class QueuePage(QWidget):
         self.buttons["skip"].setText(texts.TAKE_IN if skipped else QUEUE_ACTIONS[3][1])
 
     def _cells(self, index: int, test: Queued) -> tuple[str, ...]:
-        outcome = test.told or self._options_of(test)
+        outcome = test.outcome or self._options_of(test)
         return (
             str(index + 1),
             texts.STAGES[test.stage],

@@ -146,7 +146,7 @@ class QueueRunner(QObject):
             self.pause(f"{why}.")
         else:
             self._finish_test(
-                index, good=False, told=f"refused: {why}", why=texts.QUEUE_REFUSED.format(number=index + 1)
+                index, good=False, outcome=f"refused: {why}", why=texts.QUEUE_REFUSED.format(number=index + 1)
             )
 
     def _begin(self, index: int, each: Checked) -> None:
@@ -187,16 +187,16 @@ class QueueRunner(QObject):
         if begun[1].test.out is None:
             remove_unused(begun[0].out)
         if isinstance(ended, Refused):
-            status, good, told = ("failed" if ended.failed else "refused"), False, ended.text
+            status, good, outcome = ("failed" if ended.failed else "refused"), False, ended.text
         else:
             passed = ended.passed
             status, good = ended.status, passed and ended.status in GOOD
-            told = ended.reason if passed else "not passed"
+            outcome = ended.reason if passed else "not passed"
         why = "" if status == "completed" and good else texts.QUEUE_ENDED.format(number=index + 1, status=status)
-        self._finish_test(index, good=good, told=f"{status}: {told}", why=why)
+        self._finish_test(index, good=good, outcome=f"{status}: {outcome}", why=why)
 
-    def _finish_test(self, index: int, *, good: bool, told: str, why: str) -> None:
-        kept = self.do(lambda: self.queue.finish(index, good=good, told=told))
+    def _finish_test(self, index: int, *, good: bool, outcome: str, why: str) -> None:
+        kept = self.do(lambda: self.queue.finish(index, good=good, outcome=outcome))
         if why or not kept:
             self.pause(self.why if self._controller.latched else why)
         elif self.going:

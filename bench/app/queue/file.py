@@ -51,7 +51,7 @@ class QueueFile:
         rest = {key: value for key, value in data.items() if key not in ("format", "format_version")}
         tests = validated(_Tests, rest, lambda where: f"{self.path.name}: {dotted(where)}").tests
         self._known = text
-        left = {"stage": Stage.FAILED, "told": LEFT}
+        left = {"stage": Stage.FAILED, "outcome": LEFT}
         return tuple(test.model_copy(update=left) if test.stage is Stage.RUNNING else test for test in tests)
 
     def write(self, tests: Sequence[Queued]) -> None:

@@ -5,7 +5,9 @@ from dataclasses import dataclass
 from datetime import datetime
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
+
+from pydantic import model_validator
 
 from bench.app.catalogue import load_protocol
 from bench.app.folders import check_folder, default_folder, make_folder, result_names
@@ -53,7 +55,15 @@ class Queued(Parameters):
     unattended: bool = quantity(False, "", "whether every question is answered yes, as with --yes")
     keep_going: bool = quantity(False, "", "whether the test continues to its end if the window closes")
     stage: Stage = quantity(Stage.WAITING, "", "status")
-    told: str = quantity("", "", "outcome of the test, or reason for its refusal")
+    outcome: str = quantity("", "", "outcome of the test, or reason for its refusal")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _accept_former_name(cls, content: Any) -> Any:
+        """Files of the first edition call the outcome "told"."""
+        if not isinstance(content, dict):
+            return content
+        return {"outcome" if key == "told" else key: value for key, value in cast(dict[str, Any], content).items()}
 
     @property
     def about(self) -> dict[str, str]:
@@ -138,17 +148,17 @@ class Queue:
         for _ in range(times):
             out = _another(original.out, folders)
             folders.add(out)
-            copies.append(original.model_copy(update={"out": out, "stage": Stage.WAITING, "told": ""}))
+            copies.append(original.model_copy(update={"out": out, "stage": Stage.WAITING, "outcome": ""}))
         self._change([*self._tests[: index + 1], *copies, *self._tests[index + 1 :]])
 
     def begin(self, index: int, out: str) -> None:
         """Mark a test as running, with its results in `out`."""
         self._open(index, "begun")
-        self._set(index, self._tests[index], stage=Stage.RUNNING, out=out, told="")
+        self._set(index, self._tests[index], stage=Stage.RUNNING, out=out, outcome="")
 
-    def finish(self, index: int, *, good: bool, told: str) -> None:
+    def finish(self, index: int, *, good: bool, outcome: str) -> None:
         """Mark a test as ended or refused, even if the change cannot be stored."""
-        ended = {"stage": Stage.DONE if good else Stage.FAILED, "told": told}
+        ended = {"stage": Stage.DONE if good else Stage.FAILED, "outcome": outcome}
         test = self._tests[index].model_copy(update=ended)
         self._tests = (*self._tests[:index], test, *self._tests[index + 1 :])
         self._keep(self._tests)

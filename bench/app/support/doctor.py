@@ -75,10 +75,10 @@ def examine(folder: Path, port: str | None = None) -> Iterator[Finding]:
 
 def versions() -> Finding:
     """Check Python and the libraries."""
-    told = ", ".join(f"{name} {version}" for name, version in software().items())
+    versions = ", ".join(f"{name} {version}" for name, version in software().items())
     good = sys.version_info[:2] >= OLDEST and sys.maxsize > 2**32
     remedy = "" if good else f"install a 64-bit Python, {OLDEST[0]}.{OLDEST[1]} or newer"
-    return Finding("versions", Health.GOOD if good else Health.BAD, f"{told}, {platform.system()}", remedy)
+    return Finding("versions", Health.GOOD if good else Health.BAD, f"{versions}, {platform.system()}", remedy)
 
 
 def clock() -> Finding:
@@ -169,12 +169,12 @@ _VENDORS = {"3923": "NI", "0403": "FTDI", "10c4": "Silicon Labs", "067b": "Proli
 """Vendors of the USB devices of a bench, by identifier."""
 
 
-def _windows_usb_suspend(told: str) -> Finding:
+def _windows_usb_suspend(output: str) -> Finding:
     """Evaluate the output of powercfg: the last number is the setting on battery, the number before it the setting on
     mains power.
     """
     item = "USB suspend"
-    found = [word for word in told.split() if word.startswith("0x")]
+    found = [word for word in output.split() if word.startswith("0x")]
     if len(found) < 2:
         return Finding(item, Health.UNKNOWN, "not determined", "switch off USB selective suspend in the power plan")
     if any(int(each, 16) for each in found[-2:]):
@@ -208,8 +208,8 @@ def serial_ports(adapters: Path = Path("/sys/bus/usb-serial/devices"), devices: 
             return Finding(item, Health.BAD, f"{adapter.name} cannot be opened", "add the user to the group dialout")
         timer = adapter / "latency_timer"
         if timer.is_file() and int(timer.read_text(encoding="utf-8")) > LATENCY:
-            told = f"latency timer of {adapter.name}: {timer.read_text(encoding='utf-8').strip()} ms"
-            return Finding(item, Health.BAD, told, f"write {LATENCY} to {timer}")
+            found = f"latency timer of {adapter.name}: {timer.read_text(encoding='utf-8').strip()} ms"
+            return Finding(item, Health.BAD, found, f"write {LATENCY} to {timer}")
     return Finding(item, Health.GOOD, ", ".join(adapter.name for adapter in found))
 
 

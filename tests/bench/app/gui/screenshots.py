@@ -142,7 +142,7 @@ def fill(window: Window) -> None:
     ):
         asked = HarmonicParameters(omega=(omega,), beta=(0.4,), starts=3)
         test = queued(load_protocol("harmonic"), asked, Path("runs", f"omega-{omega:g}"), realtime=True)
-        window.runner.queue.add(test.model_copy(update={"stage": stage, "told": told}))
+        window.runner.queue.add(test.model_copy(update={"stage": stage, "outcome": told}))
     window.runner.changed.emit()
     window.queue.table.setCurrentCell(2, 0)
 

@@ -154,7 +154,7 @@ def test_a_refused_plan_pauses_the_queue_and_nothing_is_driven(
 ) -> None:
     _start(filled, spoken, qtbot, FINE, answer)
     assert _stages(filled) == [Stage.WAITING, Stage.FAILED, Stage.WAITING], "also when it is not the first"
-    assert "is refused" in filled.runner.queue.tests[1].told
+    assert "is refused" in filled.runner.queue.tests[1].outcome
     assert not filled._controller.running
     assert not filled.runner.going
 
@@ -401,7 +401,7 @@ def test_the_queue_outlives_the_window(qtbot: QtBot, spoken: type[ScriptedClient
     first.leave()
     again = _window(qtbot, path)
     assert _stages(again) == [Stage.FAILED, Stage.WAITING]
-    assert again.runner.queue.tests[0].told == LEFT
+    assert again.runner.queue.tests[0].outcome == LEFT
     assert not again.runner.going, "nothing starts by itself"
     assert str(path) in again.queue.kept.text()
     again.leave()

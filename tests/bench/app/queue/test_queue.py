@@ -51,7 +51,7 @@ def _try(queue: Queue, operation: Operation) -> None:
             case "begin" if queue.next is not None:
                 queue.begin(queue.next, queue.tests[queue.next].out or "")
             case "finish" if queue.tests[index].stage is Stage.RUNNING:
-                queue.finish(index, good=amount > 2, told="over")
+                queue.finish(index, good=amount > 2, outcome="over")
             case "skip":
                 queue.skip(index)
             case "edit":
@@ -91,7 +91,7 @@ def test_whatever_is_done_a_test_that_began_stays_as_it_was_and_no_two_share_a_f
         first = next((k for k, test in enumerate(queue.tests) if test.stage is Stage.WAITING), None)
         assert queue.next == first
     left = [
-        test.model_copy(update={"stage": Stage.FAILED, "told": LEFT}) if test.stage is Stage.RUNNING else test
+        test.model_copy(update={"stage": Stage.FAILED, "outcome": LEFT}) if test.stage is Stage.RUNNING else test
         for test in queue.tests
     ]
     assert list(QueueFile(store.path).read()) == left
@@ -159,6 +159,17 @@ def _queue(session: FakeSession, *arguments: str) -> int:
     return main_with(session, ["queue", "queue.json", *arguments])
 
 
+def test_a_file_of_the_first_edition_keeps_its_outcomes(tmp_path: Path) -> None:
+    tests = [{"protocol": "harmonic", "stage": "done", "told": "completed: the plan was carried out"}]
+    path = tmp_path / "queue.json"
+    path.write_text(json.dumps({"format": "rocking-bench queue", "format_version": 1, "tests": tests}))
+    file = QueueFile(path)
+    (test,) = file.read()
+    assert test.outcome == "completed: the plan was carried out"
+    file.write([test])
+    assert "told" not in path.read_text()
+
+
 def test_what_is_added_is_what_is_run(session: FakeSession, capsys: pytest.CaptureFixture[str]) -> None:
     add = ["run", "harmonic", "--starts", "3", "--omega", "14", "--queue", "queue.json"]
     assert main_with(session, [*add, "--out", "first", "--realtime"]) == 0
@@ -196,7 +207,7 @@ def _raising(error: BaseException) -> Callable[[Requests], None]:
 
 
 @pytest.mark.parametrize(
-    ("status", "during", "code", "stage", "told"),
+    ("status", "during", "code", "stage", "outcome"),
     [
         ("stopped", None, 1, Stage.DONE, "stopped: why it ended"),
         ("aborted", None, 1, Stage.FAILED, "aborted: why it ended"),
@@ -211,7 +222,7 @@ def test_what_waits_goes_on_waiting_after_a_test_that_did_not_end_well(
     during: Callable[[Requests], None] | None,
     code: int,
     stage: Stage,
-    told: str,
+    outcome: str,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     _write({"protocol": "harmonic", "stage": "skipped"}, {"protocol": "harmonic"}, {"protocol": "harmonic"})
@@ -221,7 +232,7 @@ def test_what_waits_goes_on_waiting_after_a_test_that_did_not_end_well(
     assert _queue(session) == code
     assert _stages() == [Stage.SKIPPED, stage, Stage.WAITING]
     assert len(session.calls) == 1
-    assert told in capsys.readouterr().out
+    assert outcome in capsys.readouterr().out
     session.status, session.during = "completed", FakeSession().during
     assert _queue(session) == 0
     assert _stages() == [Stage.SKIPPED, stage, Stage.DONE]
