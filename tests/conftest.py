@@ -5,12 +5,14 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable, Generator
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from tests.lateness import Lateness
+from tests.slowness import Slowness
 
 # a test needs no screen; a person who wants to see the windows sets the variable himself
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
@@ -52,7 +54,7 @@ PEOPLE = (
 REAL_TIME = {"instruments": INSTRUMENTS, "people": PEOPLE}
 """Groups that stay in one process each; both mostly wait."""
 
-LATENESS = pytest.StashKey[Lateness]()
+EXCUSES = pytest.StashKey[list[Lateness | Slowness]]()
 
 SPREAD = "tests/faults/test_matrix.py"
 """The longest file of all; its tests share nothing, so they fill every process at the end."""
@@ -150,10 +152,13 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, Any, Any]:
-    """A test that needs milliseconds has the lateness of the machine measured beside it."""
-    if item.get_closest_marker("milliseconds") is None:
-        return (yield)
-    with Lateness() as item.stash[LATENESS]:
+    """A test that claims something about time has the machine measured beside it."""
+    with ExitStack() as stack:
+        item.stash[EXCUSES] = []
+        if item.get_closest_marker("seconds"):
+            item.stash[EXCUSES].append(Slowness())
+        if item.get_closest_marker("milliseconds"):
+            item.stash[EXCUSES].append(stack.enter_context(Lateness()))
         return (yield)
 
 
@@ -161,10 +166,10 @@ def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, Any, Any]:
 def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, Any, Any]:
     """Its failure on a machine that does not keep time is a skip, with the figures."""
     report: Any = yield
-    if report.failed and report.when == "call" and LATENESS in item.stash:
-        excuse = item.stash[LATENESS].excuse
-        if excuse is not None:
-            report.outcome, report.longrepr = "skipped", (str(item.path), 0, excuse)
+    if report.failed and report.when == "call":
+        for measured in item.stash[EXCUSES]:
+            if (excuse := measured.excuse) is not None:
+                report.outcome, report.longrepr = "skipped", (str(item.path), 0, excuse)
     return report
 
 

@@ -11,9 +11,7 @@ from pathlib import Path
 
 from bench.config.model import BenchConfiguration
 from bench.config.toml import read_configuration
-
-_PATIENCE = 60.0
-"""Longest wait for its configuration [s]: its bench may have to be compiled first."""
+from tests.patience import LONG
 
 
 @contextmanager
@@ -25,7 +23,7 @@ def emulated(*arguments: str, shown: bool = False) -> Iterator[BenchConfiguratio
         command = [sys.executable, "-m", "bench", "emulate", "--write", str(file), "--lead", "0.4", *arguments]
         process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=None if shown else subprocess.DEVNULL)
         try:
-            deadline = time.monotonic() + _PATIENCE
+            deadline = time.monotonic() + LONG
             while not file.exists() or not file.stat().st_size:
                 if process.poll() is not None or time.monotonic() > deadline:
                     raise RuntimeError(f"no emulated laboratory: its process says {process.poll()}")
@@ -33,4 +31,4 @@ def emulated(*arguments: str, shown: bool = False) -> Iterator[BenchConfiguratio
             yield read_configuration(file)
         finally:
             process.send_signal(signal.SIGINT)
-            process.wait(_PATIENCE)
+            process.wait(LONG)

@@ -27,6 +27,7 @@ from pathlib import Path
 
 from bench.app.cli.main import main
 from tests.lateness import Lateness
+from tests.patience import LONG
 from tests.whole import partial
 
 ANSWERED = 0.5
@@ -196,7 +197,7 @@ class Bed:
                             process.wait(second)
                         except subprocess.TimeoutExpired:
                             os.killpg(process.pid, signal.SIGINT)
-                    process.wait(60.0)
+                    process.wait(LONG)
                     end = time.monotonic() - asked
             finally:
                 process.kill()

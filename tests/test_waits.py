@@ -19,6 +19,7 @@ from typing import Any
 import pytest
 
 from sim import waiting
+from tests.patience import LONG as PATIENCE
 
 ROOT = Path(__file__).parents[1]
 LONG = {
@@ -208,7 +209,7 @@ def _frozen_console(frozen: threading.Event) -> bool:
 
     display = LiveConsole(Console(file=StringIO(), force_terminal=True))
     with display:
-        draw = partial(frozen.wait, 5.0)
+        draw = partial(frozen.wait, PATIENCE)
         display._draw = lambda: draw() and None  # type: ignore[method-assign]
         display.prepare("a phase")
         time.sleep(0.01)
@@ -221,7 +222,7 @@ def _frozen_port(frozen: threading.Event) -> bool:
 
     class Line:
         def chunks(self) -> Iterator[tuple[bytes, float]]:
-            frozen.wait(5.0)
+            frozen.wait(PATIENCE)
             yield from ()
 
         def close(self) -> None: ...
@@ -251,7 +252,7 @@ def _frozen_disk(frozen: threading.Event, end: Callable[[Any], object], tmp_path
     take = recorder._take
 
     def hangs(item: Any) -> None:
-        frozen.wait(5.0)
+        frozen.wait(PATIENCE)
         take(item)
 
     recorder._take = hangs  # type: ignore[method-assign]
@@ -265,8 +266,8 @@ def _frozen_request(frozen: threading.Event) -> bool:
     """A handler of the emulated laboratory does not return: neither does the client's request, nor closing."""
     from drivers.emulation.control import ControlServer, ask
 
-    server = ControlServer({"hang": lambda _: frozen.wait(5.0)})
-    done = ask(server.address, "hang", patience=5.0)
+    server = ControlServer({"hang": lambda _: frozen.wait(PATIENCE)})
+    done = ask(server.address, "hang", patience=PATIENCE)
     server.close()
     return bool(done)
 
@@ -307,6 +308,7 @@ def _judge(freeze: Callable[[threading.Event], bool], monkeypatch: pytest.Monkey
     assert max(asked) <= waiting.STEP
 
 
+@pytest.mark.seconds
 def test_a_wait_ends_in_time_and_reports_it() -> None:
     begun = time.monotonic()
     assert not waiting.wait(threading.Event(), 0.05)

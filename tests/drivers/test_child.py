@@ -20,8 +20,8 @@ from drivers.daqmx.parameters import Daq
 from drivers.errors import DeviceNotFound
 from drivers.optoncdt.line import Line
 from tests.bench.app.ipc.experiment import order
+from tests.patience import LONG
 
-LONG = 20.0
 NO_WINDOW = 0x08000000
 """CREATE_NO_WINDOW of the Windows API, "Process Creation Flags"."""
 

@@ -3,7 +3,7 @@
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
@@ -22,6 +22,7 @@ from drivers.rig import OperatorTask, Rig
 from sim.errors import InvalidInput
 from sim.specimen import Specimen
 from sim.virtual_bench import VirtualBenchParameters
+from tests.patience import LONG, eventually
 
 LEAD = 600
 LONG_LEAD = 2000
@@ -38,14 +39,6 @@ def laboratory(connection: Connection, device: Device = "usb", listening: float 
     lasers = emulated.hardware.lasers.model_copy(update={"observation_time": listening})
     emulated.hardware = emulated.hardware.model_copy(update={"lasers": lasers})
     return emulated
-
-
-def eventually(condition: Callable[[], object], seconds: float = 20.0) -> None:
-    """Wait until the condition holds."""
-    deadline = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < deadline, "waited in vain"
-        time.sleep(0.01)
 
 
 class Wired:
@@ -200,7 +193,7 @@ class TestSerialFaults:
             (mark,) = (count for count, why in rig.channels[two].faults.items() if why == "no reflection detected")
             play(started(rig), np.zeros(400), 200)
             ask(str(serial.hardware.emulator_address), "laser", storey=2, fault="target", arguments=["none"])
-            deadline = time.monotonic() + 20.0
+            deadline = time.monotonic() + LONG
             while True:
                 (block,) = play(rig, np.zeros(200), 200)
                 if (block.counts[:, two] == mark).all():
@@ -371,6 +364,7 @@ while True:
 """
 
 
+@pytest.mark.seconds
 def test_a_program_that_is_killed_while_it_drives_loses_the_relay_to_the_watchdog() -> None:
     with laboratory("analogue") as wire:
         assert wire.hardware.daq.watchdog == 1.0

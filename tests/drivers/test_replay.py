@@ -194,6 +194,7 @@ def test_the_lead_is_that_of_the_recording_unless_told() -> None:
         ReplayRig(Made([]), lead=-1)
 
 
+@pytest.mark.seconds
 def test_under_a_wall_clock_a_block_comes_when_it_was_measured() -> None:
     clock = WallClock()
     rig: Rig = ReplayRig(Made([MadeRun([(0, 200)])]), clock=clock)

@@ -226,6 +226,7 @@ def test_virtual_time_is_the_time_of_the_samples() -> None:
     assert clock.now() == pytest.approx(5.0 + 1.5)
 
 
+@pytest.mark.seconds
 def test_under_a_wall_clock_reading_paces_the_reader() -> None:
     clock = WallClock()
     rig = SimulatedRig(VirtualBenchParameters(), Specimen(), seed=1, clock=clock)

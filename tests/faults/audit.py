@@ -22,6 +22,7 @@ from tests.faults.bench import FaultyBench, Story, released, run
 from tests.faults.fault import Fault
 from tests.faults.places import Place
 from tests.faults.setup import LIMITS, RATE
+from tests.patience import LONG
 
 STILL = 2e-4
 """Velocity [m/s] and displacement [m] below which the bench stands still."""
@@ -106,7 +107,7 @@ def left_since(before: set[threading.Thread]) -> list[str]:
     """Names of the threads that came since and do not end."""
     new = set(threading.enumerate()) - before
     for thread in new:
-        thread.join(20.0)
+        thread.join(LONG)
     return [thread.name for thread in new if thread.is_alive()]
 
 

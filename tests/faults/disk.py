@@ -6,8 +6,8 @@ from threading import Event as Flag
 from time import monotonic, sleep
 
 from bench.datafile.recorder import Recorder
+from tests.patience import LONG
 
-LONG = 20.0
 """Longest wait for the recorder's thread [s]."""
 
 

@@ -12,8 +12,7 @@ from drivers.clock import VirtualClock
 from drivers.rig import RigError
 from drivers.simulated import SimulatedRig
 from tests.faults.bench import FaultyBench, Story, run
-
-LONG = 20.0
+from tests.patience import LONG
 
 
 class Gate(VirtualClock):

@@ -12,6 +12,7 @@ import pytest
 from bench.datafile.reader import open_datafile
 from tests.faults.places import PLACES
 from tests.faults.setup import BLOCK
+from tests.patience import LONG
 
 ROOT = Path(__file__).parents[2]
 
@@ -19,7 +20,7 @@ ROOT = Path(__file__).parents[2]
 @pytest.mark.skipif(os.name != "posix", reason="kills processes the POSIX way")
 def test_killed_in_every_state(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "tests.faults.killed", str(tmp_path)]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=120, check=True)
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=LONG, check=True)
     told = dict(line.split() for line in done.stdout.splitlines())
     assert len(told) == 2 * len(PLACES)
     assert set(told.values()) == {str(-signal.SIGKILL)}, done.stderr

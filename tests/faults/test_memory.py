@@ -11,6 +11,7 @@ from bench.engine.steps import Arm, Calibrate, Dwell, Plan, Publish, RampOut, Sw
 from bench.events import Event, Progress, State
 from bench.testing.loopback import LoopbackBench
 from sim.errors import CauseCode
+from tests.patience import LONG
 
 OMEGA = 16.0
 
@@ -124,5 +125,5 @@ print(ending.status, ending.cause.code, bench.rig.halted, abs(bench.rig.played[-
 
 @pytest.mark.skipif(sys.platform != "linux", reason="needs a limit of the address space")
 def test_a_process_whose_memory_ends_while_the_table_is_driven_ramps_it_out() -> None:
-    done = subprocess.run([sys.executable, "-c", _HOG], capture_output=True, text=True, timeout=120)
+    done = subprocess.run([sys.executable, "-c", _HOG], capture_output=True, text=True, timeout=LONG)
     assert done.stdout.split() == ["failed", "memory", "False", "0.0", "True"], done.stderr

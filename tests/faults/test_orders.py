@@ -18,8 +18,8 @@ from tests.faults.bench import FaultyBench, Story, run
 from tests.faults.catalogue import catalogue
 from tests.faults.fault import Fault, never
 from tests.faults.setup import BARE, CALIBRATION, COUPLED
+from tests.patience import LONG
 
-LONG = 60.0
 FAULTS = [fault for fault in catalogue() if not (fault.disk or fault.disobeys or "enable line" in fault.name)]
 DRIVEN = (State.ARMED, State.RUNNING, State.STOPPING, State.ABORTING)
 

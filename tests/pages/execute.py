@@ -19,6 +19,7 @@ from unittest.mock import patch
 from bench.app.cli.main import main
 from tests.bench.accelerograms.real import CAMPAIGN as CAMPAIGN_RECORDS
 from tests.pages.blocks import ROOT, Block, Command, blocks
+from tests.patience import LONG
 
 CAMPAIGN = ROOT / "tests" / "data" / "first_edition" / "harmonic_point.h5.xz"
 """A recorded campaign, for pages that read one."""
@@ -36,9 +37,6 @@ SERVERS = ("emulate",)
 
 PATIENCE = 900.0
 """Time limit of one command [s]."""
-
-START = 60.0
-"""Time limit for a server to write its configuration [s]."""
 
 
 @dataclass(frozen=True)
@@ -184,7 +182,7 @@ def _servers(block: Block, folder: Path) -> Iterator[None]:
         )
         started.append(process)
         written = folder / words[words.index("--write") + 1]
-        deadline = time.monotonic() + START
+        deadline = time.monotonic() + LONG
         while not written.exists() and process.poll() is None and time.monotonic() < deadline:
             time.sleep(0.1)
     try:

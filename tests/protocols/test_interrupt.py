@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from bench.datafile.reader import open_datafile
+from tests.patience import LONG
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="sends SIGINT to one process")
@@ -22,7 +23,7 @@ def test_ctrl_c(tmp_path: Path) -> None:
     try:
         _wait_until_running(folder / "campaign.h5", process)
         process.send_signal(signal.SIGINT)
-        _, errors = process.communicate(timeout=60)
+        _, errors = process.communicate(timeout=LONG)
     finally:
         process.kill()
     assert process.returncode == 130
@@ -39,6 +40,7 @@ def test_ctrl_c(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="sends SIGINT to one process")
+@pytest.mark.seconds
 @pytest.mark.parametrize("times", [1, 3])
 def test_ctrl_c_while_the_run_is_planned(tmp_path: Path, times: int) -> None:
     """The default campaign plans its starts for many seconds, most of them in native code."""
@@ -50,7 +52,7 @@ def test_ctrl_c_while_the_run_is_planned(tmp_path: Path, times: int) -> None:
         for _ in range(times):
             process.send_signal(signal.SIGINT)
             time.sleep(0.05)
-        output, errors = process.communicate(timeout=60)
+        output, errors = process.communicate(timeout=LONG)
         took = time.monotonic() - asked
     finally:
         process.kill()
@@ -64,7 +66,7 @@ def test_ctrl_c_while_the_run_is_planned(tmp_path: Path, times: int) -> None:
 
 def _wait_until_running(path: Path, process: "subprocess.Popen[str]") -> None:
     """Wait until the drive moves the table."""
-    deadline = time.monotonic() + 60.0
+    deadline = time.monotonic() + LONG
     while time.monotonic() < deadline:
         assert process.poll() is None, process.communicate()
         if path.exists():

@@ -12,6 +12,7 @@ from bench.app.cli import closing
 from bench.app.support import awake as module
 from bench.app.support.awake import CONTINUOUS, SYSTEM_REQUIRED, awake
 from bench.app.support.doctor import Health, _windows_usb_suspend, sleep, usb_suspend
+from tests.patience import eventually
 
 POWERCFG = """
 Power Setting GUID: 48e6b7a6-50f5-4782-a5d4-53bb8f07e226  (USB selective suspend setting)
@@ -36,9 +37,7 @@ def test_the_inhibiting_program_lives_as_long_as_the_run(tmp_path: Path, monkeyp
     program.chmod(program.stat().st_mode | stat.S_IXUSR)
     monkeypatch.setitem(module.COMMANDS, "linux", (str(program), *module.COMMANDS["linux"][1:]))
     with awake("linux") as possible:
-        end = time.monotonic() + 5.0
-        while not log.exists() and time.monotonic() < end:
-            time.sleep(0.01)
+        eventually(log.exists)
         assert possible
     assert log.read_text() == "began\nended\n"
 

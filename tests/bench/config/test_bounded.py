@@ -29,6 +29,7 @@ DEEP = {
 
 @pytest.mark.parametrize("reader", READERS)
 @pytest.mark.parametrize("kind", DEEP)
+@pytest.mark.seconds
 def test_deep_nesting_is_refused_soon(reader: str, kind: str, tmp_path: Path) -> None:
     path, text = tmp_path / "file", DEEP[kind]
     path.write_text(f"a = {text.replace(':', '=')}\n" if reader == "toml" else text, encoding="utf-8")

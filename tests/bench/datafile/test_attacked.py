@@ -19,6 +19,7 @@ from bench.datafile.recorder import Recorder
 from bench.datafile.recovery import recover
 from sim.errors import RockbenchError
 from tests.bench.datafile.living import begin, hand_over
+from tests.patience import LONG
 
 SOON = 5.0
 """Longest time for an answer about a damaged file [s]."""
@@ -137,10 +138,11 @@ print("over")
 
 def test_files_that_are_truncated_while_they_are_written_do_not_stop_the_process(tmp_path: Path) -> None:
     """HDF5 holds the interpreter while it searches for what is cut off, and the engine with it."""
-    done = subprocess.run([sys.executable, "-c", _AMID, str(tmp_path)], timeout=60, capture_output=True, text=True)
+    done = subprocess.run([sys.executable, "-c", _AMID, str(tmp_path)], timeout=LONG, capture_output=True, text=True)
     assert (done.returncode, done.stdout) == (0, "over\n"), done.stderr
 
 
+@pytest.mark.seconds
 def test_readers_of_a_truncated_file_refuse_it_soon(tmp_path: Path) -> None:
     path, cut = tmp_path / "run.h5", tmp_path / "cut.h5"
     recorder = _recording(path)
@@ -157,6 +159,7 @@ def test_readers_of_a_truncated_file_refuse_it_soon(tmp_path: Path) -> None:
     recorder.close("completed")
 
 
+@pytest.mark.seconds
 def test_a_reader_that_follows_a_file_notices_that_it_is_truncated(tmp_path: Path) -> None:
     path = tmp_path / "run.h5"
     recorder = _recording(path)

@@ -205,6 +205,7 @@ def test_a_plain_reader_needs_three_lines(path: Path) -> None:
     np.testing.assert_array_equal(value[known], ours[known])
 
 
+@pytest.mark.seconds
 def test_samples_reach_the_file_in_a_second_though_no_chunk_is_full_and_nothing_follows(path: Path) -> None:
     recorder = begin(path)
     recorder(block(0, 10))

@@ -18,6 +18,7 @@ from bench.events import Acquired, PointFinished, State, StateChanged
 from drivers.rig import Block, Channel
 from protocols.harmonic.protocol import HarmonicPoint
 from tests.bench.datafile.living import BLOCK, NAMES, POINT, check, counts_of
+from tests.patience import LONG
 
 ROOT = Path(__file__).parents[3]
 POSIX_ONLY = pytest.mark.skipif(os.name != "posix", reason="kills and limits processes the POSIX way")
@@ -99,7 +100,7 @@ def test_a_living_file_can_be_read_and_grows(tmp_path: Path) -> None:
 def test_a_full_disk_ends_with_one_error_and_a_readable_file(tmp_path: Path) -> None:
     path = tmp_path / "campaign.h5"
     with writer(path, "full") as process:
-        output, _ = process.communicate(timeout=20)
+        output, _ = process.communicate(timeout=LONG)
     *told, error = output.splitlines()
     assert process.returncode == 0
     assert error.startswith("error: ")

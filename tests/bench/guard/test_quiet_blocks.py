@@ -1,7 +1,7 @@
 """Blocks judged by their extremes alone: the same decisions, sample for sample, as with every sample compared."""
 
-import sys
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import pytest
@@ -18,6 +18,7 @@ from bench.guard.sensors import SensorWatch
 from bench.guard.shaker import ShakerModel
 from bench.testing.loopback import LoopbackRig
 from drivers.rig import Channel
+from tests.calls import calls
 
 RATE = 1000.0
 INVALID = -32768
@@ -227,16 +228,6 @@ def test_a_command_is_refused_as_by_the_comparison_of_every_sample(blocks: list[
         command = float(volts[-1])
 
 
-class _Counted:
-    """Counts calls, Python's and those of compiled functions."""
-
-    def __init__(self) -> None:
-        self.calls = 0
-
-    def __call__(self, _frame: object, event: str, _argument: object) -> None:
-        self.calls += event in ("call", "c_call")
-
-
 @pytest.mark.parametrize("shaker", [None, ShakerModel(20.0, 100.0, 20.0)])
 def test_a_quiet_block_costs_few_calls(shaker: ShakerModel | None) -> None:
     """Operation counts hold on noisy machines, where times do not."""
@@ -258,12 +249,9 @@ def test_a_quiet_block_costs_few_calls(shaker: ShakerModel | None) -> None:
         for counted, known in ((short, extremes), (full, None)):
             if number % 2 == (counted is short):
                 continue
-            count = _Counted()
-            sys.setprofile(count)
-            motion.check(number * n, values, made, known)
-            sensors.check(number * n, each, values, each[:, 0].astype(float), known)
-            sys.setprofile(None)
-            counted.append(count.calls)
+            on_motion = calls(partial(motion.check, number * n, values, made, known))
+            drive = each[:, 0].astype(float)
+            counted.append(on_motion + calls(partial(sensors.check, number * n, each, values, drive, known)))
     assert np.median(short) < 60
     assert np.median(short) < 0.4 * np.median(full)
 

@@ -27,6 +27,7 @@ from sim.excitation import SampledRecord
 from sim.rocking import simulate
 from sim.specimen import Frame, Specimen
 from tests.bench.twin.twin_bench import COUPLED, MOUNT, RATE, REMOVE, Beside, configuration, shaken
+from tests.patience import LONG
 from tests.recorded import recorded
 
 Array = NDArray[np.float64]
@@ -185,7 +186,7 @@ def test_the_bench_never_waits_for_the_model(monkeypatch: pytest.MonkeyPatch) ->
     take = Estimator.take
 
     def blocked(self: Estimator, *arguments: object) -> TwinEstimate | None:
-        go_on.wait(30.0)
+        go_on.wait(LONG)
         return take(self, *arguments)  # type: ignore[arg-type]
 
     monkeypatch.setattr(Estimator, "take", blocked)
@@ -204,7 +205,7 @@ def test_a_model_that_is_late_gives_up_members_first(monkeypatch: pytest.MonkeyP
     take = Estimator.take
 
     def paced(self: Estimator, *arguments: object) -> TwinEstimate | None:
-        turn.acquire(timeout=30.0)
+        turn.acquire(timeout=LONG)
         return take(self, *arguments)  # type: ignore[arg-type]
 
     monkeypatch.setattr(Estimator, "take", paced)

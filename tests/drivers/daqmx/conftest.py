@@ -1,7 +1,6 @@
 """Emulated devices on a bench whose inputs are wired to its output."""
 
 import threading
-import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, suppress
 from typing import Any
@@ -15,20 +14,13 @@ from drivers.emulation.daqmx.server import DaqServer
 from drivers.errors import RigError
 from sim.sensors import Converter
 from tests.drivers.daqmx.loopback import BITS, RANGE, Loopback
+from tests.patience import eventually
 
 RATE = 2000.0
 LEAD = 100
 INPUTS = tuple(AnalogInput(terminal=f"Dev1/ai{k}") for k in range(4))
 
 OpenSession = Callable[..., DaqSession]
-
-
-def eventually(condition: Callable[[], object], seconds: float = 20.0) -> None:
-    """Wait until the condition holds."""
-    deadline = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < deadline, "waited in vain"
-        time.sleep(0.005)
 
 
 @pytest.fixture

@@ -15,9 +15,10 @@ from drivers.emulation.daqmx.zoo import build
 from drivers.errors import ConnectionLost, RigError
 from sim.errors import InvalidInput
 from sim.sensors import Converter
-from tests.drivers.daqmx.conftest import LEAD, RATE, closed_whatever_it_says, eventually
+from tests.drivers.daqmx.conftest import LEAD, RATE, closed_whatever_it_says
 from tests.drivers.daqmx.loopback import BITS, RANGE, Loopback
 from tests.drivers.daqmx.runs import BLOCK, driving, is_safe
+from tests.patience import eventually
 
 MODULES = ("9205", "9263", "9485", "9401")
 INPUTS = (AnalogInput(terminal="cDAQ1Mod1/ai0"),)
@@ -73,7 +74,7 @@ def test_an_expiry_opens_the_relay_sets_the_output_to_zero_and_needs_a_new_sessi
         if way == "network":
             server.lose_network()
         # at once, or after its second: long before the time-out of the other case
-        eventually(lambda: not plant.enabled, 10.0)
+        eventually(lambda: not plant.enabled)
         # the output too, long before the samples that wait are played
         assert plant.present_output() == 0.0
         assert session.cut() is True

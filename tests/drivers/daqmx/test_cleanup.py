@@ -9,10 +9,11 @@ import pytest
 from drivers.daqmx.session import DaqSession
 from drivers.emulation.daqmx.server import DaqServer
 from drivers.errors import ConnectionLost, DeviceNotFound, RigError
-from tests.drivers.daqmx.conftest import RATE, OpenSession, eventually
+from tests.drivers.daqmx.conftest import RATE, OpenSession
 from tests.drivers.daqmx.loopback import Loopback
 from tests.drivers.daqmx.runs import BLOCK, driving, is_safe, started
 from tests.drivers.daqmx.wire import Wire
+from tests.patience import eventually
 
 
 @pytest.fixture

@@ -40,6 +40,7 @@ def open_session(server: str | None) -> object:
     return DaqSession(Daq(server=server), [AnalogInput()], 2000.0, 100)
 
 
+@pytest.mark.seconds
 @pytest.mark.parametrize(("server", "use"), [(mute_server, open_session), (nobody, find_devices)])
 def test_a_server_that_does_not_answer_is_not_waited_for(
     server: Callable[[], contextlib.AbstractContextManager[str]], use: Callable[[str], object]

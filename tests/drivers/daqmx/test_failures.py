@@ -13,10 +13,11 @@ from drivers.daqmx.session import DaqSession
 from drivers.emulation.daqmx.server import DaqServer
 from drivers.errors import ConnectionLost, DeviceTimeout, DriveUnderflow, InputOverflow, RigError
 from sim.errors import InvalidInput
-from tests.drivers.daqmx.conftest import LEAD, RATE, OpenSession, eventually
+from tests.drivers.daqmx.conftest import LEAD, RATE, OpenSession
 from tests.drivers.daqmx.loopback import Loopback
 from tests.drivers.daqmx.runs import BLOCK, driving, is_safe, started
 from tests.drivers.daqmx.wire import Wire
+from tests.patience import eventually
 
 
 def test_a_drive_that_was_written_too_late_is_an_underflow(session: DaqSession, plant: Loopback) -> None:
@@ -222,6 +223,7 @@ def read_on(session: DaqSession) -> None:
         session.read(BLOCK)
 
 
+@pytest.mark.seconds
 @pytest.mark.parametrize("fault", [gone_server, pulled_cable, frozen_cable, stalled_server])
 def test_a_server_that_goes_away_is_noticed_in_time(
     server: DaqServer, open_session: OpenSession, fault: Callable[[DaqServer, Wire], None]

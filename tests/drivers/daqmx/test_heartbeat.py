@@ -11,10 +11,11 @@ from drivers.daqmx.session import DaqSession
 from drivers.emulation.daqmx.server import DaqServer
 from drivers.emulation.safety_chain import PulseRelay
 from drivers.errors import RigError
-from tests.drivers.daqmx.conftest import RATE, OpenSession, eventually
+from tests.drivers.daqmx.conftest import RATE, OpenSession
 from tests.drivers.daqmx.loopback import Loopback
 from tests.drivers.daqmx.runs import BLOCK, driving, started
 from tests.drivers.daqmx.wired import Contacts, wired
+from tests.patience import eventually
 
 TIMEOUT = 0.5
 
@@ -75,6 +76,8 @@ def test_a_cut_ends_it_at_once(session: DaqSession, contacts: Contacts) -> None:
     assert contacts.beats == given
 
 
+@pytest.mark.milliseconds
+@pytest.mark.seconds
 def test_a_loop_that_hangs_loses_the_relay(session: DaqSession, contacts: Contacts) -> None:
     driving(session)
     assert contacts.relay.closed

@@ -13,10 +13,11 @@ from drivers.emulation.daqmx.models import compact_rio
 from drivers.emulation.daqmx.server import DaqServer
 from drivers.errors import RigError
 from sim.errors import InvalidInput
-from tests.drivers.daqmx.conftest import RATE, OpenSession, eventually
+from tests.drivers.daqmx.conftest import RATE, OpenSession
 from tests.drivers.daqmx.loopback import Loopback
 from tests.drivers.daqmx.runs import BLOCK, driving, is_safe, started
 from tests.drivers.daqmx.wired import HEARTBEAT, INPUTS, LINES, Contacts, wired
+from tests.patience import eventually
 
 NAMES = ["emergency stop", "over-travel", "over-travel 2", "amplifier ready"]
 

@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 from drivers.daqmx.session import DaqSession
 from drivers.errors import RigError
 from sim.errors import InvalidInput
-from tests.drivers.daqmx.conftest import LEAD, RATE, OpenSession, eventually
+from tests.drivers.daqmx.conftest import LEAD, RATE, OpenSession
 from tests.drivers.daqmx.loopback import COUNTS_PER_VOLT, Loopback
 from tests.drivers.daqmx.runs import BLOCK, driving, is_safe, started
+from tests.patience import LONG, eventually
 
 
 def test_the_session_says_what_the_device_is(session: DaqSession) -> None:
@@ -113,7 +114,7 @@ def test_the_relay_is_cut_while_another_thread_reads(session: DaqSession, plant:
     assert session.cut() is True
     assert not plant.enabled
     assert not read
-    reader.join(20.0)
+    reader.join(LONG)
     assert read == [round(1.5 * RATE)]
 
 
@@ -130,7 +131,7 @@ def test_a_stop_ends_a_read_of_another_thread(session: DaqSession, plant: Loopba
     reader.start()
     eventually(lambda: session.acquired() > 100)
     session.stop()
-    assert ended.wait(20.0)
+    assert ended.wait(LONG)
     reader.join()
     eventually(lambda: is_safe(plant))
     # and the read has not started the clock again

@@ -7,9 +7,10 @@ from drivers.daqmx.session import DaqSession
 from drivers.emulation.daqmx.server import DaqServer
 from drivers.errors import ConnectionLost, RigError
 from sim.errors import InvalidInput
-from tests.drivers.daqmx.conftest import RATE, OpenSession, eventually
+from tests.drivers.daqmx.conftest import RATE, OpenSession
 from tests.drivers.daqmx.loopback import Loopback
 from tests.drivers.daqmx.runs import BLOCK, driving, is_safe
+from tests.patience import eventually
 
 TIMEOUT = 1.0
 

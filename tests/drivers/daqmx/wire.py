@@ -5,6 +5,8 @@ import socket
 import threading
 from collections.abc import Callable
 
+from tests.patience import LONG
+
 
 class Wire:
     """Forwards TCP connections to `server` (host:port); `address` is where clients connect."""
@@ -36,7 +38,7 @@ class Wire:
     def close(self) -> None:
         self.pull()
         for thread in self._threads:
-            thread.join(5.0)
+            thread.join(LONG)
             assert not thread.is_alive()
 
     def _start(self, target: Callable[..., None], *args: object) -> None:

@@ -2,7 +2,7 @@
 
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack, suppress
 from math import floor
 from typing import Any, Self
@@ -26,6 +26,7 @@ from drivers.emulation.daqmx.server import DaqServer
 from drivers.emulation.plant import Output
 from sim.channel import Counts
 from sim.sensors import Converter
+from tests.patience import eventually
 
 RATE = 2000.0
 CONVERTER = Converter(bits=16, range=10.0)
@@ -36,14 +37,6 @@ STILL = 1234
 """Counts at terminal 2."""
 NEW = SessionInitializationBehavior.INITIALIZE_SERVER_SESSION
 ATTACH = SessionInitializationBehavior.ATTACH_TO_SERVER_SESSION
-
-
-def eventually(condition: Callable[[], object], seconds: float = 20.0) -> None:
-    """Wait until the condition holds."""
-    deadline = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < deadline, "waited in vain"
-        time.sleep(0.002)
 
 
 class Wires:
@@ -98,7 +91,7 @@ class Wires:
     def pass_ticks(self, n: int) -> None:
         """Wait until `n` more ticks have passed."""
         end = self.tick() + n
-        eventually(lambda: self.tick() >= end, 10.0 + 2.0 * n / self._true_rate)
+        eventually(lambda: self.tick() >= end)
 
     @property
     def output(self) -> float:

@@ -12,9 +12,8 @@ from drivers.emulation.optoncdt.dialogue import Dialogue
 from drivers.emulation.optoncdt.sensor import Sensor
 from drivers.emulation.optoncdt.settings import Settings
 from sim.sensors import Laser
+from tests.patience import LONG
 
-DEADLINE = 20.0
-"""How long a loaded machine may take for anything [s]."""
 PERFECT = Laser(measuring_range=0.2, noise=0.0, linearity=0.0, clock_error=0.0)
 """No errors: what the sensor sends is what the manual's formula says, to half a step."""
 
@@ -72,7 +71,7 @@ def blocks(received: bytes, size: int) -> NDArray[np.int64]:
 
 def receive(port: serial.Serial, enough: Callable[[bytes], bool]) -> bytes:
     """Read until it is enough; AssertionError when that takes too long."""
-    received, deadline = b"", time.monotonic() + DEADLINE
+    received, deadline = b"", time.monotonic() + LONG
     while not enough(received):
         assert time.monotonic() < deadline, received[-200:]
         received += port.read(max(port.in_waiting, 1))

@@ -13,8 +13,7 @@ from drivers.emulation.control import ControlServer, ask, place_of
 from drivers.errors import ConnectionLost, DeviceTimeout, RigError
 from drivers.rig import OperatorTask
 from sim.errors import InvalidInput
-
-DEADLINE = 20.0
+from tests.patience import LONG
 
 
 def refuse(arguments: dict[str, Any]) -> object:
@@ -46,7 +45,7 @@ def server(done: list[dict[str, Any]]) -> Iterator[ControlServer]:
 def exchange(server: ControlServer) -> Iterator[Callable[[bytes], dict[str, Any]]]:
     """One line there, one line back, over one connection."""
     host, port = server.address.split(":")
-    with socket.create_connection((host, int(port)), timeout=DEADLINE) as connection:
+    with socket.create_connection((host, int(port)), timeout=LONG) as connection:
         lines = connection.makefile("rb")
 
         def send(line: bytes) -> dict[str, Any]:
@@ -113,13 +112,13 @@ def test_a_malformed_line_is_refused_and_the_next_is_served(
 
 def test_a_command_that_waits_does_not_hold_up_others() -> None:
     go_on, answers = threading.Event(), []
-    server = ControlServer({"wait": lambda _: go_on.wait(DEADLINE), "now": lambda _: "now"})
+    server = ControlServer({"wait": lambda _: go_on.wait(LONG), "now": lambda _: "now"})
     waiting = threading.Thread(target=lambda: answers.append(ask(server.address, "wait")))
     waiting.start()
     assert ask(server.address, "now") == "now"
     assert not answers
     go_on.set()
-    waiting.join(DEADLINE)
+    waiting.join(LONG)
     server.close()
     assert answers == [True]
 
@@ -179,7 +178,7 @@ def test_nothing_is_left_after_closing() -> None:
     server = ControlServer({"now": lambda _: "now"})
     assert ask(server.address, "now") == "now"
     host, port = server.address.split(":")
-    with socket.create_connection((host, int(port)), timeout=DEADLINE) as idle:
+    with socket.create_connection((host, int(port)), timeout=LONG) as idle:
         idle.sendall(b'{"command": "now"}\n')
         assert idle.recv(4096) == b'{"ok": true, "result": "now"}\n'
         server.close()

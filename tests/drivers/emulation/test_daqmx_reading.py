@@ -11,7 +11,8 @@ from nidaqmx.errors import DaqError, DaqReadError
 from nidaqmx.stream_readers import AnalogMultiChannelReader, AnalogUnscaledReader
 
 from drivers.emulation.daqmx.models import compact_rio
-from tests.drivers.emulation.daqmx_loopback import CYCLE, LSB, STILL, Desk, counts, eventually
+from tests.drivers.emulation.daqmx_loopback import CYCLE, LSB, STILL, Desk, counts
+from tests.patience import LONG, eventually
 
 
 @pytest.fixture
@@ -208,7 +209,7 @@ def test_many_may_wait_at_once(desk: Desk) -> None:
         thread.start()
     eventually(lambda: task.in_stream.curr_read_pos == 2000)
     for thread in reads:
-        thread.join(20.0)
+        thread.join(LONG)
     assert len(counts(task, 10)) == 10
 
 

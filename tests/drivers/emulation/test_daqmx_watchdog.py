@@ -9,7 +9,8 @@ from nidaqmx.errors import DaqError
 from nidaqmx.system.watchdog import AOExpirationState, DOExpirationState
 
 from drivers.emulation.daqmx.models import compact_rio, x_series
-from tests.drivers.emulation.daqmx_loopback import Desk, eventually
+from tests.drivers.emulation.daqmx_loopback import Desk
+from tests.patience import eventually
 
 RELAY = "Dev1/port0/line0"
 

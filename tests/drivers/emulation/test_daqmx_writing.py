@@ -9,7 +9,8 @@ from nidaqmx.constants import OutputDataTransferCondition, RegenerationMode, Tas
 from nidaqmx.errors import DaqError, DaqWriteError, RpcError
 
 from drivers.emulation.daqmx.models import compact_rio
-from tests.drivers.emulation.daqmx_loopback import LSB, Desk, Wires, counts, eventually, staircase, write
+from tests.drivers.emulation.daqmx_loopback import LSB, Desk, Wires, counts, staircase, write
+from tests.patience import eventually
 
 
 @pytest.fixture

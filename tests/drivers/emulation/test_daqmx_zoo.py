@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from drivers.emulation.daqmx.conversion import conversion_period
 from drivers.emulation.daqmx.zoo import NAMES, build
 from sim.errors import InvalidInput
-from tests.drivers.emulation.daqmx_loopback import LSB, RATE, Desk, eventually
+from tests.drivers.emulation.daqmx_loopback import LSB, RATE, Desk
+from tests.patience import eventually
 
 FILTER = 40.0 + 5.0 / 512.0
 TICK = 1.0 / RATE

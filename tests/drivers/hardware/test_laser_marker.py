@@ -14,6 +14,7 @@ from drivers.hardware.parameters import Hardware
 from drivers.hardware.rig import HardwareRig
 from sim.specimen import Specimen
 from sim.virtual_bench import VirtualBenchParameters
+from tests.patience import LONG
 
 pytestmark = [
     pytest.mark.skipif(sys.platform == "win32", reason="emulated serial lasers need pseudo-terminals"),
@@ -77,5 +78,5 @@ def test_the_counter_never_waits_for_a_laser(laboratory: Laboratory) -> None:
     with laser._lock:  # pyright: ignore[reportPrivateUsage]
         switched = threading.Thread(target=laser.switch, args=(np.zeros(0),), daemon=True)
         switched.start()
-        switched.join(20.0)
+        switched.join(LONG)
         assert not switched.is_alive()

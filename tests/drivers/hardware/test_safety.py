@@ -19,7 +19,7 @@ from drivers.hardware.rig import HardwareRig
 from sim.errors import InvalidInput
 from sim.specimen import Specimen
 from sim.virtual_bench import VirtualBenchParameters
-from tests.drivers.daqmx.conftest import eventually
+from tests.patience import LONG, eventually
 
 LEAD = 1000
 BLOCK = 100
@@ -66,7 +66,7 @@ def test_inputs_that_cannot_be_read_end_the_run(laboratory: Laboratory, rig: Har
 
 def test_a_table_that_runs_away_opens_the_switch_of_its_end(laboratory: Laboratory, rig: HardwareRig) -> None:
     started(rig)
-    deadline = time.monotonic() + 10.0
+    deadline = time.monotonic() + LONG
     while all(rig.interlocks().values()):
         assert time.monotonic() < deadline
         play(rig, np.full(BLOCK, 4.0))

@@ -17,11 +17,11 @@ from drivers.optoncdt.stream import Readings
 from drivers.rig import Channel
 from drivers.timebase.sensor_track import SensorTrack
 from sim.sensors import Laser
+from tests.patience import LONG
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="emulated serial lasers need pseudo-terminals")
 
 RATE = 2000.0
-DEADLINE = 30.0
 
 
 class Still:
@@ -73,11 +73,13 @@ class Run:
         return counts, now() - begun
 
 
+@pytest.mark.milliseconds
+@pytest.mark.seconds
 def test_a_silent_laser_is_late_and_soon_not_waited_for(
     emulated: tuple[EmulatedLaser, EmulatedLaser], lasers: Tracks
 ) -> None:
     run = Run(lasers, 200)
-    deadline = now() + DEADLINE
+    deadline = now() + LONG
     while (run.block()[0] == LATE).any():
         assert now() < deadline
     emulated[1].silence(60.0)
@@ -92,6 +94,8 @@ def test_a_silent_laser_is_late_and_soon_not_waited_for(
     assert np.median(waits) < 0.025
 
 
+@pytest.mark.milliseconds
+@pytest.mark.seconds
 def test_a_short_block_waits_for_half_its_duration_at_most(
     emulated: tuple[EmulatedLaser, EmulatedLaser], lasers: Tracks, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -21,8 +21,7 @@ import fcntl
 import termios
 import tty
 
-DEADLINE = 20.0
-"""How long a test waits for anything [s]."""
+from tests.patience import LONG
 
 
 class Peer:
@@ -59,7 +58,7 @@ class Peer:
     def wait_heard(self, commands: int) -> None:
         """Wait until so many commands have come."""
         with self._changed:
-            assert self._changed.wait_for(lambda: self._heard >= commands or self._wrong, DEADLINE)
+            assert self._changed.wait_for(lambda: self._heard >= commands or self._wrong, LONG)
 
     def unplug(self) -> None:
         """Both ends of the line go."""
@@ -117,7 +116,7 @@ def no_thread_left() -> Iterator[None]:
     """What is done inside leaves no thread behind."""
     before = set(threading.enumerate())
     yield
-    deadline = time.monotonic() + DEADLINE
+    deadline = time.monotonic() + LONG
     while left := set(threading.enumerate()) - before:
         assert time.monotonic() < deadline, left
         next(iter(left)).join(0.1)

@@ -16,8 +16,9 @@ from drivers.optoncdt.search import find_lasers
 from drivers.optoncdt.sensor import SerialLaser
 from drivers.optoncdt.stream import Readings
 from sim.sensors import Laser
-from tests.drivers.optoncdt.peer import DEADLINE, no_thread_left
+from tests.drivers.optoncdt.peer import no_thread_left
 from tests.drivers.optoncdt.script import joined
+from tests.patience import LONG
 
 PLACE = 0.030
 """Where the target stands, from mid range [m]."""
@@ -77,7 +78,7 @@ def test_a_network_port_without_a_server_is_named() -> None:
 def taken_until(laser: SerialLaser, enough: Callable[[Readings], bool]) -> Readings:
     """Everything that comes until there is enough."""
     taken = [laser.take()]
-    deadline = time.monotonic() + DEADLINE
+    deadline = time.monotonic() + LONG
     while not enough(joined(taken)):
         assert time.monotonic() < deadline
         laser.wait(0.1)

@@ -12,8 +12,9 @@ from drivers.errors import ConnectionLost
 from drivers.optoncdt.dialogue import CommandRefused
 from drivers.optoncdt.sensor import SerialLaser
 from sim.sensors import Laser
-from tests.drivers.optoncdt.peer import DEADLINE, Peer, no_thread_left
+from tests.drivers.optoncdt.peer import Peer, no_thread_left
 from tests.drivers.optoncdt.script import INFO, OPENED, STARTED, STOPPED, measurements
+from tests.patience import LONG
 
 
 class Still:
@@ -21,10 +22,10 @@ class Still:
         return np.zeros(times.size)
 
 
-def take_until_deadline(laser: SerialLaser) -> None:
-    deadline = time.monotonic() + DEADLINE
+def take_all(laser: SerialLaser) -> None:
+    deadline = time.monotonic() + LONG
     while time.monotonic() < deadline:
-        laser.wait(DEADLINE)
+        laser.wait(LONG)
         laser.take()
 
 
@@ -74,6 +75,6 @@ def test_whatever_ends_the_reader_is_a_lost_connection(error: Exception, monkeyp
         monkeypatch.setattr("drivers.optoncdt.codec.Decoder.feed", fail)
         peer.send(b"".join(measurements(range(30), 31)))
         with pytest.raises(ConnectionLost, match=r"laser_1 on .* was disconnected .*reopen it"):
-            take_until_deadline(laser)
+            take_all(laser)
         laser.close()
         peer.wait_heard(len(script))

@@ -14,8 +14,9 @@ from drivers.optoncdt.codec import LASER_OFF, encode, marked
 from drivers.optoncdt.sensor import SerialLaser
 from drivers.optoncdt.stream import Readings
 from sim.errors import InvalidInput
-from tests.drivers.optoncdt.peer import DEADLINE, Peer, no_thread_left
+from tests.drivers.optoncdt.peer import Peer, no_thread_left
 from tests.drivers.optoncdt.script import INFO, OPENED, STARTED, STOPPED, Script, joined, measurements
+from tests.patience import LONG
 
 CODES = np.random.default_rng(5).integers(0, 65521, 4000).astype(np.int32)
 LOCK = 9
@@ -35,7 +36,7 @@ def opened(peer: Peer) -> SerialLaser:
 def eventually(laser: SerialLaser, n: int) -> Readings:
     """Take until there are `n` readings."""
     taken: list[Readings] = []
-    deadline = time.monotonic() + DEADLINE
+    deadline = time.monotonic() + LONG
     while sum(len(one) for one in taken) < n:
         assert time.monotonic() < deadline
         laser.wait(0.1)
@@ -44,7 +45,7 @@ def eventually(laser: SerialLaser, n: int) -> Readings:
 
 
 def until(happened: Callable[[], bool]) -> None:
-    deadline = time.monotonic() + DEADLINE
+    deadline = time.monotonic() + LONG
     while not happened():
         assert time.monotonic() < deadline
         time.sleep(0.001)
@@ -116,7 +117,7 @@ def test_waiting_ends_with_a_value_or_in_time() -> None:
         eventually(laser, 30 - LOCK)
         assert not laser.wait(0.01)
         peer.send(b"".join(measurements(CODES[30:32], 31)))
-        assert laser.wait(DEADLINE)
+        assert laser.wait(LONG)
 
 
 def without_queries(script: Script) -> Script:
@@ -176,7 +177,7 @@ def test_an_unplugged_sensor_is_told_by_take_every_time() -> None:
         laser.start()
         eventually(laser, 30 - LOCK)
         peer.unplug()
-        assert laser.wait(DEADLINE)
+        assert laser.wait(LONG)
         for _ in range(2):
             with pytest.raises(ConnectionLost, match=r"laser_1 on .* was disconnected .*; plug it in"):
                 laser.take()

@@ -17,9 +17,8 @@ from tests.faults.emulated.truth import GRACE, OUTPUT
 from tests.faults.emulated.witness import Truth, Witness
 from tests.faults.rig import FaultyRig
 from tests.faults.setup import BARE, PARAMETERS
+from tests.patience import LONG
 
-LONG = 60.0
-"""Longest wait for the campaign's process to come to its end [s]."""
 WATCHED = KEEPER + GRACE
 """How long the laboratory is watched after the death [s]."""
 _ATTEMPTS = 3

@@ -13,7 +13,11 @@ from tests.faults.emulated.setup import KEEPER, PLACES, SETTING
 from tests.faults.emulated.truth import GRACE, rest_rules
 from tests.faults.places import Place
 
-pytestmark = pytest.mark.skipif(os.name != "posix", reason="kills processes the POSIX way")
+pytestmark = [
+    pytest.mark.skipif(os.name != "posix", reason="kills processes the POSIX way"),
+    pytest.mark.milliseconds,
+    pytest.mark.seconds,
+]
 
 DRIVEN = ("at rest", "dwelling", "stopping", "aborting")
 """A place in each state in which the rig is armed; the ramps have just begun there, and are not yet in the buffer."""

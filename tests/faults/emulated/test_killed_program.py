@@ -18,11 +18,14 @@ from bench.results import FILE
 from drivers.emulation.control import ask
 from drivers.hardware.rig import HardwareRig
 from tests.emulated import emulated
+from tests.patience import LONG
 
-pytestmark = pytest.mark.skipif(os.name != "posix", reason="kills processes the POSIX way")
+pytestmark = [
+    pytest.mark.skipif(os.name != "posix", reason="kills processes the POSIX way"),
+    pytest.mark.milliseconds,
+    pytest.mark.seconds,
+]
 
-LONG = 60.0
-"""Longest wait for the program to come so far [s]."""
 LATE = 0.5
 """What a busy machine may add to a time-out [s]."""
 

@@ -16,6 +16,7 @@ from bench.config.model import BenchConfiguration
 from bench.datafile.reader import DataFile, open_datafile
 from tests.emulated import emulated
 from tests.lateness import Lateness
+from tests.patience import LONG
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="needs pseudo-terminals, and signals that stop a process")
 
@@ -77,7 +78,7 @@ def stalled(configuration: BenchConfiguration, lead: float, path: Path) -> None:
         client.send_signal(signal.SIGSTOP)
         time.sleep(STALL)
         client.send_signal(signal.SIGCONT)
-        assert client.wait(60.0) == 0
+        assert client.wait(LONG) == 0
 
 
 def lost_values(record: DataFile) -> dict[str, int]:

@@ -65,6 +65,7 @@ def does(laboratory: Laboratory, fault: str, arguments: list[object]) -> None:
     ask(str(laboratory.hardware.emulator_address), "safety", fault=fault, arguments=arguments)
 
 
+@pytest.mark.seconds
 @pytest.mark.parametrize(
     ("fault", "arguments", "says"),
     [

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from bench.app.cli.process import _carry_out  # pyright: ignore[reportPrivateUsage]
+from tests.patience import LONG
 
 COMMANDS = (
     "predict steady --omega 16 --beta 0.4",
@@ -63,7 +64,7 @@ def test_a_console_without_the_character_shows_a_substitute(
 def test_a_process_with_such_a_console_shows_a_substitute(recorded: Path, tmp_path: Path) -> None:
     environment = os.environ | {"PYTHONIOENCODING": "cp1252:strict", "PYTHONUTF8": "0", "COLUMNS": "200"}
     line = [sys.executable, "-m", "bench", "file", "info", str(recorded)]
-    done = subprocess.run(line, env=environment, cwd=tmp_path, capture_output=True, timeout=120.0)
+    done = subprocess.run(line, env=environment, cwd=tmp_path, capture_output=True, timeout=LONG)
     assert done.returncode == 0, done.stderr
     assert b"UnicodeEncodeError" not in done.stderr
     assert "? ± ?" in done.stdout.decode("cp1252")

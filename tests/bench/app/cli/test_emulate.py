@@ -16,11 +16,9 @@ from bench.config.toml import read_configuration
 from bench.rigs import open_rig
 from bench.testing.conformance import play, started
 from drivers.daqmx.devices import find_devices
+from tests.patience import LONG
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no pseudo-terminals, and no SIGTERM")
-
-PATIENCE = 60.0
-"""Time for the laboratory to start on a loaded machine [s]."""
 
 
 class Laboratory:
@@ -41,7 +39,7 @@ class Laboratory:
 
     def configuration(self) -> BenchConfiguration:
         """What it gives out, as soon as it serves."""
-        deadline = time.monotonic() + PATIENCE
+        deadline = time.monotonic() + LONG
         while not (self.file.exists() and self.file.read_text(encoding="utf-8").endswith("\n")):
             assert self.process.poll() is None, "".join(self.said)
             assert time.monotonic() < deadline, "the laboratory does not start"
@@ -52,7 +50,7 @@ class Laboratory:
         """Ask it to end, and wait for its exit code."""
         if self.process.poll() is None:
             self.process.send_signal(number)
-        code = self.process.wait(PATIENCE)
+        code = self.process.wait(LONG)
         self._reader.join()
         for stream in (self.process.stdout, self.process.stderr):
             assert stream is not None

@@ -14,6 +14,7 @@ SOON = 2.0
 """Longest time of a command [s]; the machine of the tests may be busy, so it counts processor time."""
 MEMORY = 200_000
 """Largest growth of the memory [kB]."""
+pytestmark = pytest.mark.seconds
 COMMANDS = ("file info", "file verify", "file recover", "export", "report", "replay", "analyse")
 KINDS = kinds()
 SOME = KINDS[:60] + KINDS[60::18]

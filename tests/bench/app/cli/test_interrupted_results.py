@@ -10,6 +10,7 @@ import pytest
 
 from bench.app.cli.main import main
 from tests.interrupts import COMMANDS, misjudged
+from tests.patience import LONG
 from tests.whole import partial
 
 PREDICT = ["predict", "modes", "--out"]
@@ -81,7 +82,7 @@ run()
 def test_the_thread_that_ends_the_process_keeps_and_names_it(tmp_path: Path) -> None:
     out = tmp_path / "new.h5"
     process = [sys.executable, "-c", HANGING, *PREDICT, str(out)]
-    done = subprocess.run(process, capture_output=True, text=True, timeout=60.0)
+    done = subprocess.run(process, capture_output=True, text=True, timeout=LONG)
     assert (done.returncode, [*tmp_path.iterdir()], partial(out)) == (130, [out], None)
     assert done.stderr.count(f"{out} is complete") == 1
 

@@ -12,6 +12,7 @@ import pytest
 
 from bench.app.cli.main import main
 from bench.app.cli.streams import lasting
+from tests.patience import LONG
 
 RUN = ["run", "free-vibration", "--repeats", "1"]
 FULL = Path("/dev/full")
@@ -61,7 +62,7 @@ def test_a_command_whose_standard_error_is_gone_ends_well(how: str, tmp_path: Pa
             [sys.executable, "-m", "bench", *RUN, "--out", str(tmp_path / "run"), "--json"],
             stdout=subprocess.PIPE,
             stderr=target,
-            timeout=120,
+            timeout=LONG,
         )
     finally:
         for handle in {writer, target}:
@@ -79,7 +80,7 @@ def test_a_result_that_cannot_be_printed_is_one_line(tmp_path: Path) -> None:
             stdout=full,
             stderr=subprocess.PIPE,
             text=True,
-            timeout=60,
+            timeout=LONG,
         )
     assert done.returncode == 1
     assert "No space left on device" in done.stderr

@@ -27,6 +27,7 @@ from bench.live_values import Estimate
 from drivers.rig import Block, Channel
 from sim.errors import InvalidInput
 from sim.parameters import Parameters, quantity
+from tests.patience import LONG
 
 RATE = 1652.8925619834711
 """What a device makes of 1650 Hz: no time of it is a short decimal."""
@@ -167,7 +168,7 @@ def test_octave_opens_the_matlab_file(campaign: Path, tmp_path: Path, counts: di
         "t.points.reason{2});"
     )
     done = subprocess.run(
-        ["octave-cli", "--norc", "--no-history", "--eval", script], cwd=out, capture_output=True, timeout=100
+        ["octave-cli", "--norc", "--no-history", "--eval", script], cwd=out, capture_output=True, timeout=LONG
     )
     unit, name, rows, lost, last, time, of, gain, words = done.stdout.decode(errors="replace").split("|")
     assert (unit, name, rows, lost, of) == ("m", "7 of 9", "1000", "5", "rad/s")

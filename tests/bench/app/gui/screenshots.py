@@ -28,8 +28,8 @@ from bench.events import Event
 from bench.live_values import Estimate
 from bench.results import FILE
 from protocols.harmonic.protocol import HarmonicParameters
+from tests.patience import LONG
 
-LONG = 120.0
 SIZE = (1280, 800)
 
 

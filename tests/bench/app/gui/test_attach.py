@@ -26,9 +26,9 @@ from bench.datafile.reader import open_datafile
 from bench.engine.interface import Requests
 from bench.events import StepStarted
 from tests.bench.app.ipc.experiment import SHAKING, bench, order
+from tests.patience import LONG_MS
 
 ROOT = Path(__file__).parents[4]
-LONG = 60_000
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="kills a process the POSIX way")
 
@@ -62,17 +62,17 @@ def test_a_window_after_a_killed_one_has_state_log_and_stop(
     window = opened(qtbot, qapp)
     began = time.monotonic()
     controller = window.header._controller  # pyright: ignore[reportPrivateUsage]
-    qtbot.waitUntil(lambda: window.header.word.text() == "RUNNING", timeout=LONG)
-    qtbot.waitUntil(lambda: "shaking" in window.run.log.toPlainText(), timeout=LONG)
-    qtbot.waitUntil(lambda: len(window.run.traces.ring) > 0, timeout=LONG)
+    qtbot.waitUntil(lambda: window.header.word.text() == "RUNNING", timeout=LONG_MS)
+    qtbot.waitUntil(lambda: "shaking" in window.run.log.toPlainText(), timeout=LONG_MS)
+    qtbot.waitUntil(lambda: len(window.run.traces.ring) > 0, timeout=LONG_MS)
     print(f"attached after {time.monotonic() - began:.2f} s")
     assert str(tmp_path / "run") in window.header.reason.text()
     assert "another window's run" in window.header.reason.text().lower()
     assert not window.protocol.start.isEnabled()
     assert window.protocol.why_not == "a run is under way"
-    qtbot.waitUntil(lambda: controller.session.controls, timeout=LONG)
+    qtbot.waitUntil(lambda: controller.session.controls, timeout=LONG_MS)
     qtbot.mousePress(window.header.stop, Qt.MouseButton.LeftButton)
-    qtbot.waitUntil(lambda: not controller.running, timeout=LONG)
+    qtbot.waitUntil(lambda: not controller.running, timeout=LONG_MS)
     window.close()
     with open_datafile(tmp_path / "run" / "campaign.h5") as record:
         assert (record.status, record.summary) == ("aborted", "abort requested")
@@ -83,7 +83,7 @@ def test_a_window_after_a_killed_one_has_state_log_and_stop(
 def test_a_second_window_only_watches_and_stops(qtbot: QtBot, qapp: QApplication, tmp_path: Path) -> None:
     window = opened(qtbot, qapp)
     controller = window.header._controller  # pyright: ignore[reportPrivateUsage]
-    qtbot.waitUntil(lambda: window.header.word.text() == "RUNNING", timeout=LONG)
+    qtbot.waitUntil(lambda: window.header.word.text() == "RUNNING", timeout=LONG_MS)
     assert not controller.session.controls
     assert not window.run.ramp_out.isEnabled()
     controller.ramp_out()
@@ -92,9 +92,9 @@ def test_a_second_window_only_watches_and_stops(qtbot: QtBot, qapp: QApplication
     assert window.header.word.text() == "RUN ELSEWHERE"
     assert not controller.running
     window.header.attach.click()
-    qtbot.waitUntil(lambda: window.header.word.text() == "RUNNING", timeout=LONG)
+    qtbot.waitUntil(lambda: window.header.word.text() == "RUNNING", timeout=LONG_MS)
     controller.press_stop()
-    qtbot.waitUntil(lambda: not controller.running, timeout=LONG)
+    qtbot.waitUntil(lambda: not controller.running, timeout=LONG_MS)
     window.close()
     with open_datafile(tmp_path / "run" / "campaign.h5") as record:
         assert record.status == "aborted"

@@ -6,6 +6,7 @@ from PySide6.QtCore import QObject
 from pytestqt.qtbot import QtBot
 
 from bench.app.gui.background import Reader
+from tests.patience import LONG_MS
 
 
 def test_an_error_of_the_program_is_raised_in_the_thread_of_the_window(qtbot: QtBot) -> None:
@@ -18,8 +19,8 @@ def test_an_error_of_the_program_is_raised_in_the_thread_of_the_window(qtbot: Qt
 
     with qtbot.captureExceptions() as raised:
         reader.call(wrong)
-        qtbot.waitUntil(lambda: bool(found and raised))
+        qtbot.waitUntil(lambda: bool(found and raised), timeout=LONG_MS)
     assert [kind for kind, _, _ in raised] == [ZeroDivisionError]
     assert "_tell" in [frame.name for frame in traceback.extract_tb(raised[0][2])], "not in the pool's thread"
     reader.call(lambda: 7)
-    qtbot.waitUntil(lambda: found[-1] == 7)
+    qtbot.waitUntil(lambda: found[-1] == 7, timeout=LONG_MS)

@@ -14,6 +14,7 @@ from bench.app.ipc.messages import Beat, Ended, Opened, Preparing, Published, Qu
 from bench.events import Progress, State, StateChanged, StepStarted
 from tests.bench.app.gui.conftest import ScriptedClient
 from tests.bench.app.ipc.experiment import order
+from tests.patience import LONG_MS
 
 NO_PLOTS = pytest.mark.usefixtures("without_live_plots")
 
@@ -92,7 +93,7 @@ def test_stop_stays_in_its_place_whatever_is_said(window: Window, link: Scripted
         Question(1, "Mount the spring, and look at it from every side. " * 3),
     ]
     window._controller._look()
-    qtbot.waitUntil(window.prompt.isVisible)
+    qtbot.waitUntil(window.prompt.isVisible, timeout=LONG_MS)
     qtbot.wait(100)
     assert stop.mapTo(window, stop.rect().topLeft()) == place
     assert window.width() == window.minimumWidth()
@@ -202,7 +203,7 @@ def test_closing_asks_nothing_when_the_run_is_over(window: Window, link: Scripte
 
 @pytest.mark.usefixtures("without_live_plots", "window")
 def test_the_main_loop_keeps_the_link_alive(link: ScriptedClient, qtbot: QtBot) -> None:
-    qtbot.waitUntil(lambda: link.beats >= 3, timeout=3000)
+    qtbot.waitUntil(lambda: link.beats >= 3, timeout=LONG_MS)
 
 
 @NO_PLOTS

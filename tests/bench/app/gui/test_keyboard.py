@@ -30,6 +30,7 @@ from bench.app.ipc.messages import Question
 from bench.app.queue.queue import Queued
 from tests.bench.app.gui.conftest import PROTOCOLS, SHAKING, ScriptedClient
 from tests.bench.app.ipc.experiment import bench, order
+from tests.patience import LONG_MS
 
 OPERATED = (QAbstractButton, QLineEdit, QComboBox, QAbstractSpinBox, QAbstractItemView, QPlainTextEdit, QTabBar)
 MANY = 200
@@ -111,9 +112,9 @@ def test_a_question_is_answered_by_a_key_of_its_own(window: Window, spoken: type
         qtbot.keyClick(window.run, key)
     qtbot.wait(150)
     assert spoken.latest.asked == []
-    qtbot.waitUntil(window.prompt.done.isEnabled)
+    qtbot.waitUntil(window.prompt.done.isEnabled, timeout=LONG_MS)
     both = Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.ShiftModifier
-    with qtbot.waitSignal(window.prompt.done.clicked):
+    with qtbot.waitSignal(window.prompt.done.clicked, timeout=LONG_MS):
         qtbot.keyClick(window.run, Qt.Key.Key_Return, both)
     assert spoken.latest.asked == [(3, True)]
 

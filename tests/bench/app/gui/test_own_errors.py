@@ -18,6 +18,7 @@ from bench.app.gui.trouble import TroublePanel
 from bench.app.gui.window import Window, attend
 from tests.bench.app.gui.conftest import SHAKING
 from tests.bench.app.ipc.experiment import bench
+from tests.patience import LONG_MS
 
 pytestmark = pytest.mark.usefixtures("without_plots", "spoken")
 
@@ -61,7 +62,7 @@ def test_an_error_in_a_thread_is_told_in_the_thread_of_the_window(
         worker.start()
         worker.join()
         assert not window.trouble.isVisible(), "not from another thread"
-        qtbot.waitUntil(window.trouble.isVisible, timeout=1000)
+        qtbot.waitUntil(window.trouble.isVisible, timeout=LONG_MS)
     assert threads == [True, True]
     assert heard == ["anywhere", "in a thread"]
     assert "ValueError: in a thread" in window.trouble.answers[0].text()
@@ -84,7 +85,7 @@ def test_the_same_error_is_told_once_and_never_in_place_of_the_bench(
     qtbot.wait(20)
     assert not window.trouble.isVisible()
     _raise("another")
-    qtbot.waitUntil(window.trouble.isVisible, timeout=1000)
+    qtbot.waitUntil(window.trouble.isVisible, timeout=LONG_MS)
 
 
 def test_the_program_has_the_filter_of_stop(qtbot: QtBot, qapp: QApplication) -> None:

@@ -18,8 +18,7 @@ from bench.app.gui.window import Window
 from bench.config.model import BenchConfiguration
 from tests.bench.app.gui.conftest import PROTOCOLS
 from tests.installed import example
-
-LONG = 90_000
+from tests.patience import LONG_MS
 
 
 @pytest.fixture
@@ -52,17 +51,17 @@ def test_its_form_its_run_and_its_live_number(window: Window, qtbot: QtBot, tmp_
     page.realtime.setChecked(True)
     page.person.setChecked(False)
     page.check_plan()
-    qtbot.waitUntil(page.start.isEnabled, timeout=LONG)
+    qtbot.waitUntil(page.start.isEnabled, timeout=LONG_MS)
     qtbot.mouseClick(page.start, Qt.MouseButton.LeftButton)
 
     def measured() -> bool:
         return run.verdict.isVisible() and run.verdict.sentence.startswith("gain of the table")
 
-    qtbot.waitUntil(measured, timeout=LONG)
+    qtbot.waitUntil(measured, timeout=LONG_MS)
     assert window.pages.currentWidget() is run
     assert window.header.word.text() == "RUNNING"
     shown, predicted, _difference = run.verdict.sentence.split(" · ")
-    qtbot.waitUntil(lambda: window.pages.currentWidget() is window.results, timeout=LONG)
+    qtbot.waitUntil(lambda: window.pages.currentWidget() is window.results, timeout=LONG_MS)
     summary = json.loads((tmp_path / "run" / "summary.json").read_text(encoding="utf-8"))
     (point,) = summary["points"]
     gain = measurement(point["gain_m_s2_v"], point["gain_uncertainty"], "m/s²/V")

@@ -15,6 +15,7 @@ from bench.events import OperatorAsked
 from drivers.rig import OperatorTask
 from tests.bench.app.gui.conftest import ScriptedClient
 from tests.bench.app.ipc.experiment import order
+from tests.patience import LONG_MS
 
 pytestmark = pytest.mark.usefixtures("without_plots")
 
@@ -45,14 +46,14 @@ def test_a_key_that_is_held_answers_no_question_unread(window: Window, link: Scr
     qtbot.mouseClick(window.prompt.done, Qt.MouseButton.LeftButton)
     qtbot.mouseClick(window.prompt.decline, Qt.MouseButton.LeftButton)
     assert link.asked == [], "it has only just appeared"
-    qtbot.waitUntil(window.prompt.done.isEnabled, timeout=2000)
+    qtbot.waitUntil(window.prompt.done.isEnabled, timeout=LONG_MS)
     for _ in range(5):
         _hold(window, again=True)
         QApplication.processEvents()
     qtbot.wait(150)
     assert link.asked == [], "the key was held since before it could be answered"
     _hold(window, again=False)
-    qtbot.waitUntil(lambda: link.asked == [(1, True)], timeout=1000)
+    qtbot.waitUntil(lambda: link.asked == [(1, True)], timeout=LONG_MS)
     _ask(window, link, 2)
     assert not window.prompt.done.isEnabled(), "the next one has not been read either"
     assert not window.prompt.decline.isEnabled()

@@ -20,6 +20,7 @@ from protocols.harmonic.protocol import HarmonicParameters
 from sim.errors import Cause, InvalidInput
 from tests.bench.app.gui.conftest import PROTOCOLS, ScriptedClient
 from tests.bench.app.ipc.experiment import bench
+from tests.patience import LONG_MS
 
 pytestmark = pytest.mark.usefixtures("without_plots")
 
@@ -181,7 +182,7 @@ def test_what_the_plan_says_is_not_cut_off(window: Window, spoken: type[Scripted
     spoken.latest.said.append(PlanChecked((), None, warnings, 60.0, 1e6, 1e9, "hash", {}))
     window._controller._look()
     for label in (page.plan.verdict, page.plan.details):
-        qtbot.waitUntil(lambda label=label: label.height() >= label.heightForWidth(label.width()), timeout=2000)
+        qtbot.waitUntil(lambda label=label: label.height() >= label.heightForWidth(label.width()), timeout=LONG_MS)
 
 
 def test_the_margin_shown_is_the_one_that_95_percent_of_the_specimens_keep(

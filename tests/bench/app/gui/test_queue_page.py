@@ -22,6 +22,7 @@ from bench.config.model import BenchConfiguration
 from sim.errors import Cause, InvalidInput
 from tests.bench.app.gui.conftest import PROTOCOLS, SHAKING, ScriptedClient
 from tests.bench.app.ipc.experiment import bench, order
+from tests.patience import LONG_MS
 
 pytestmark = pytest.mark.usefixtures("without_plots")
 
@@ -64,7 +65,7 @@ def _start(window: Window, spoken: type[ScriptedClient], qtbot: QtBot, *answers:
 
 
 def _answer(window: Window, spoken: type[ScriptedClient], qtbot: QtBot, *answers: FromSession) -> None:
-    qtbot.waitUntil(lambda: window.runner._check in window._controller._plan_checks)
+    qtbot.waitUntil(lambda: window.runner._check in window._controller._plan_checks, timeout=LONG_MS)
     for answer in answers:
         _hear(window, spoken, answer)
 
@@ -75,7 +76,7 @@ def _run(window: Window, spoken: type[ScriptedClient], qtbot: QtBot, status: str
     run = link.assignment
     assert isinstance(run, Run)
     _hear(window, spoken, Ended(status, "told", {"points": []}, "", run.out))
-    qtbot.waitUntil(lambda: spoken.latest is not link or not window.runner.going)
+    qtbot.waitUntil(lambda: spoken.latest is not link or not window.runner.going, timeout=LONG_MS)
     return run
 
 
@@ -222,7 +223,7 @@ def test_questions_between_tests_are_asked_as_ever(filled: Window, spoken: type[
     _start(filled, spoken, qtbot)
     _hear(filled, spoken, Question(1, "Mount the spring of beta = 0.4."))
     assert filled.prompt.isVisible()
-    qtbot.waitUntil(filled.prompt.done.isEnabled)
+    qtbot.waitUntil(filled.prompt.done.isEnabled, timeout=LONG_MS)
     filled.prompt.done.click()
     assert spoken.latest.asked == [(1, True)]
 
@@ -240,7 +241,7 @@ def test_everything_is_done_from_the_keyboard(filled: Window, qtbot: QtBot, tmp_
 
     def press(name: str, key: Qt.Key, modifier: Qt.KeyboardModifier = Qt.KeyboardModifier.NoModifier) -> None:
         # Qt shows the button pressed for a moment
-        with qtbot.waitSignal(filled.queue.buttons[name].clicked):
+        with qtbot.waitSignal(filled.queue.buttons[name].clicked, timeout=LONG_MS):
             qtbot.keyClick(table, key, modifier)
 
     press("down", Qt.Key.Key_Down, control)
@@ -277,7 +278,7 @@ def test_what_waits_is_edited_in_its_form_and_what_began_is_not(
     # the test is moved while it is edited
     queue.move(1, 1)
     _check(filled, spoken, 66)
-    with qtbot.waitSignal(page.add.clicked):
+    with qtbot.waitSignal(page.add.clicked, timeout=LONG_MS):
         qtbot.keyClick(page, Qt.Key.Key_J, Qt.KeyboardModifier.ControlModifier)
     assert [test.parameters["cycles"] for test in queue.tests] == [5, 7, 66]
     assert filled.pages.currentWidget() is filled.queue
@@ -352,7 +353,7 @@ def test_tests_that_share_a_folder_or_do_not_fit_together_are_found_before_the_f
     runner.queue.add(Queued(protocol="shaking", out=str(tmp_path / "first")))
     link = spoken.latest
     runner.start()
-    qtbot.waitUntil(lambda: not runner.going)
+    qtbot.waitUntil(lambda: not runner.going, timeout=LONG_MS)
     assert "test 1 has the same folder" in filled.queue.status.text()
     assert spoken.latest is link, "not even checked"
     assert not filled._controller.running

@@ -17,8 +17,6 @@ from bench.datafile.reader import open_datafile
 from sim.errors import InvalidInput
 from tests.bench.app.gui.virtual_screen import NEEDED, Screen, missing, until, virtual_screen
 
-LONG = 90.0
-
 pytestmark = [
     pytest.mark.skipif(os.name != "posix", reason="a virtual X server is a POSIX thing"),
     pytest.mark.skipif(bool(missing()), reason=f"needs {' and '.join(NEEDED)}; missing here: {missing()}"),
@@ -41,7 +39,7 @@ def started(screen: Screen, folder: Path, *program: str) -> Generator[subprocess
         [sys.executable, "-m", *program], cwd=folder, env={**screen.environment, **settings}
     ) as window:
         try:
-            screen.focus(texts.TITLE, LONG, lambda: window.poll() is not None)
+            screen.focus(texts.TITLE, lambda: window.poll() is not None)
             yield window
         finally:
             window.kill()
@@ -73,12 +71,12 @@ def _start(folder: Path, screen: Screen) -> None:
         screen.press("ctrl+Return")
         return _driven(folder)
 
-    until(begun, LONG, "no run drove the table")
+    until(begun, "no run drove the table")
 
 
 def _ended(folder: Path) -> tuple[str, str]:
     """How the run ended; its file is whole and the drive ends at zero."""
-    until(lambda: _status(folder)[0] != "running", LONG, "the run did not end")
+    until(lambda: _status(folder)[0] != "running", "the run did not end")
     path = next(folder.glob("runs/*/campaign.h5"))
     until(lambda: verify(path).problems == (), 10.0, "the file is not whole")
     with open_datafile(path) as record:

@@ -25,9 +25,9 @@ from bench.datafile.tables import Column
 from bench.events import Acquired, PointFinished
 from drivers.rig import Block, Channel
 from protocols.harmonic.protocol import HarmonicPoint, PointStatus
+from tests.patience import LONG_MS
 
 RATE, N = 1000.0, 4000
-LONG = 60_000
 CHANNELS = (
     Channel("table_acceleration", "acceleration", "m/s2", 1e-3, 0.0, (-32_000, 32_000), "made"),
     Channel("laser_1", "displacement", "m", 1e-6, 0.0, (-32_000, 32_000), "made"),
@@ -214,11 +214,13 @@ def test_samples_are_read_beside_the_window(page: ResultsPage, files: tuple[Path
     # a laser's counts are micrometres, shown in millimetres
     view.run.setCurrentIndex(1)
     view.channel.setCurrentText("drive")
-    qtbot.waitUntil(lambda: view.shown is not None and view.shown.unit == "V", timeout=LONG)
+    qtbot.waitUntil(lambda: view.shown is not None and view.shown.unit == "V", timeout=LONG_MS)
     np.testing.assert_allclose(view.curve.getData()[1], 0.2, rtol=1e-6)
     view.channel.setCurrentText("laser 1")
     view._item.setXRange(1.0, 1.1, padding=0.0)
-    qtbot.waitUntil(lambda: view.shown is not None and (view.shown.begin, view.shown.unit) == (1.0, "m"), timeout=LONG)
+    qtbot.waitUntil(
+        lambda: view.shown is not None and (view.shown.begin, view.shown.unit) == (1.0, "m"), timeout=LONG_MS
+    )
     np.testing.assert_allclose(view.curve.getData()[1], 1e-3 * _counts(2)[1000:1101, 1], rtol=1e-6)
 
 
@@ -231,7 +233,7 @@ def test_export_and_report_are_those_of_the_command_line(
     outputs = page.outputs
     outputs.export.click()
     assert not outputs.export.isEnabled()
-    qtbot.waitUntil(outputs.open_made.isVisible, timeout=LONG)
+    qtbot.waitUntil(outputs.open_made.isVisible, timeout=LONG_MS)
     assert outputs.message.text() == texts.MADE.format(path=folder / "campaign-mat-2")
     made = next((folder / "campaign-mat-2").glob("*run*1*.mat"))
     np.testing.assert_allclose(np.ravel(loadmat(made)["laser_1"]), 1e-6 * _counts(1)[:, 1], rtol=1e-9)
@@ -246,7 +248,7 @@ def test_what_cannot_be_made_says_why(page: ResultsPage, files: tuple[Path, Path
     page.show_file(files[0])
     page.outputs.use(files[0].with_name("none.h5"))
     page.outputs.report.click()
-    qtbot.waitUntil(page.outputs.report.isEnabled, timeout=LONG)
+    qtbot.waitUntil(page.outputs.report.isEnabled, timeout=LONG_MS)
     assert "there is no such file" in page.outputs.message.text()
     assert not page.outputs.open_made.isVisible()
 

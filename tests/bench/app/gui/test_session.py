@@ -9,8 +9,7 @@ from pytestqt.qtbot import QtBot
 
 from bench.app.gui.window import Window
 from bench.datafile.reader import open_datafile
-
-LONG = 60_000
+from tests.patience import LONG_MS
 
 
 @pytest.mark.usefixtures("qapp")
@@ -22,13 +21,13 @@ def test_from_the_form_to_the_file(window: Window, qtbot: QtBot, tmp_path: Path)
     page.realtime.setChecked(False)
     page.person.setChecked(True)
     page.check_plan()
-    qtbot.waitUntil(page.start.isEnabled, timeout=LONG)
+    qtbot.waitUntil(page.start.isEnabled, timeout=LONG_MS)
     qtbot.mouseClick(page.start, Qt.MouseButton.LeftButton)
-    qtbot.waitUntil(window.prompt.isVisible, timeout=LONG)
+    qtbot.waitUntil(window.prompt.isVisible, timeout=LONG_MS)
     assert window.header.word.text() == "WAITING"
-    qtbot.waitUntil(window.prompt.done.isEnabled)
+    qtbot.waitUntil(window.prompt.done.isEnabled, timeout=LONG_MS)
     qtbot.mouseClick(window.prompt.done, Qt.MouseButton.LeftButton)
-    qtbot.waitUntil(lambda: window.pages.currentWidget() is window.results, timeout=LONG)
+    qtbot.waitUntil(lambda: window.pages.currentWidget() is window.results, timeout=LONG_MS)
     assert "The run was completed" in window.results.message.text()
     assert window.results.table.rowCount() == 1
     assert len(window.run.traces.ring) > 100

@@ -25,6 +25,7 @@ from bench.events import PointFinished
 from sim.identified import Finding, Identified
 from tests.bench.app.gui.conftest import ScriptedClient
 from tests.bench.app.ipc.experiment import bench, order
+from tests.patience import LONG_MS
 
 pytestmark = pytest.mark.usefixtures("without_plots")
 
@@ -152,11 +153,11 @@ def test_devices_are_asked_for_by_the_command_and_the_window_goes_on(
     qtbot.mouseClick(panel.ask, Qt.MouseButton.LeftButton)
     assert panel.message.text() == texts.FINDING
     assert not panel.ask.isEnabled()
-    qtbot.waitUntil(lambda: panel.message.text() == texts.FOUND, timeout=20_000)
+    qtbot.waitUntil(lambda: panel.message.text() == texts.FOUND, timeout=LONG_MS)
     assert panel.found.toPlainText() == "NI devices: -m bench devices"
     panel.use(window.setup.configuration, tmp_path / "refused")
     panel.look()
-    qtbot.waitUntil(lambda: "search for devices failed" in panel.message.text(), timeout=20_000)
+    qtbot.waitUntil(lambda: "search for devices failed" in panel.message.text(), timeout=LONG_MS)
     assert f"--config {tmp_path / 'refused'}" in panel.message.text()
     assert panel.ask.isEnabled()
 

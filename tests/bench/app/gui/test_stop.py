@@ -17,6 +17,7 @@ from bench.app.ipc.messages import Beat, Ended
 from bench.events import State
 from tests.bench.app.gui.conftest import ScriptedClient
 from tests.bench.app.ipc.experiment import order
+from tests.patience import LONG_MS
 
 NO_PLOTS = pytest.mark.usefixtures("without_plots")
 
@@ -80,7 +81,7 @@ def test_a_press_counts_beside_a_list_that_is_open(window: Window, link: Scripte
     window.pages.setCurrentWidget(window.protocol)
     handle, stop = window.windowHandle(), window.header.stop
     window.protocol.choice.showPopup()
-    qtbot.waitUntil(lambda: QApplication.activePopupWidget() is not None)
+    qtbot.waitUntil(lambda: QApplication.activePopupWidget() is not None, timeout=LONG_MS)
     beside = window.header.lamp
     for part, asked in ((stop, ["abort"]), (beside, ["abort"])):
         QTest.mouseClick(handle, Qt.MouseButton.LeftButton, pos=part.mapTo(window, part.rect().center()))

@@ -12,6 +12,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from tests.patience import LONG
+
 NEEDED = ("Xvfb", "xdotool")
 SIZE = (1400, 900)
 
@@ -21,9 +23,9 @@ def missing() -> str:
     return ", ".join(name for name in NEEDED if shutil.which(name) is None)
 
 
-def until(condition: Callable[[], object], seconds: float, what: str) -> None:
+def until(condition: Callable[[], object], what: str) -> None:
     """Wait; raises AssertionError with `what` when it never comes true."""
-    end = time.monotonic() + seconds
+    end = time.monotonic() + LONG
     while not condition():
         assert time.monotonic() < end, what
         time.sleep(0.1)
@@ -44,15 +46,15 @@ class Screen:
     def do(self, *arguments: str) -> str:
         """Run xdotool; empty when it found nothing."""
         done = subprocess.run(
-            ["xdotool", *arguments], env=self.environment, capture_output=True, text=True, check=False, timeout=20.0
+            ["xdotool", *arguments], env=self.environment, capture_output=True, text=True, check=False, timeout=LONG
         )
         return done.stdout.strip()
 
-    def focus(self, title: str, seconds: float, over: Callable[[], bool]) -> str:
+    def focus(self, title: str, over: Callable[[], bool]) -> str:
         """Wait for the window called `title`, unless its program is `over`; give it the keyboard as a window manager
         would. Returns its number.
         """
-        until(lambda: self.do("search", "--onlyvisible", "--name", title) or over(), seconds, f"no window {title}")
+        until(lambda: self.do("search", "--onlyvisible", "--name", title) or over(), f"no window {title}")
         assert not over(), "the program ended"
         number = self.do("search", "--onlyvisible", "--name", title).splitlines()[0]
         self.do("windowmove", number, "0", "0")

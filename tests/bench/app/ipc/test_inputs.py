@@ -15,6 +15,7 @@ from bench.app.ipc.server import PERIOD, Publisher, RemoteOperator, SessionServe
 from bench.engine.interface import Requests
 from bench.events import Acquired, State, StateChanged
 from drivers.rig import Block, Rig, RigError
+from tests.patience import LONG
 
 
 class Wired:
@@ -105,13 +106,13 @@ def test_they_are_told_while_a_question_stands_from_the_thread_of_the_engine(hos
     engine = threading.Thread(target=lambda: answers.append(asking.confirm("Clamp the table.")), name="engine")
     rig.threads.clear()
     engine.start()
-    end = time.monotonic() + 20.0
+    end = time.monotonic() + LONG
     while sum(isinstance(message, SafetyInputs) for message in sent) < 2:
         assert time.monotonic() < end
         time.sleep(0.02)
         rig.good = False
     host.answers.put(Answer(1, True))
-    engine.join(20.0)
+    engine.join(LONG)
     assert answers == [True]
     assert rig.threads == {"engine"}
     assert isinstance(sent[0], Question)

@@ -16,9 +16,9 @@ from bench.datafile.inspection import verify
 from bench.datafile.reader import DataFile, open_datafile
 from bench.results import FILE
 from tests.faults.setup import RAMPS, RATE
+from tests.patience import LONG
 
 ROOT = Path(__file__).parents[4]
-LONG = 40.0
 
 posix = pytest.mark.skipif(os.name != "posix", reason="kills and freezes processes the POSIX way")
 

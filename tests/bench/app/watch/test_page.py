@@ -28,7 +28,7 @@ from protocols.harmonic.protocol import HarmonicParameters, HarmonicPoint, Point
 from sim.errors import InvalidInput
 from sim.specimen import Specimen
 from tests.bench.app.ipc.experiment import order
-from tests.bench.app.ipc.test_attaching import until
+from tests.patience import LONG, eventually
 
 HOSTILE = "</script><script>alert(1)</script>\u2028\"'&"
 
@@ -45,7 +45,7 @@ class Served:
         self.held = ExitStack()
 
     def get(self, path: str, method: str = "GET", **headers: str) -> HTTPResponse:
-        connection = HTTPConnection(*self.place, timeout=10.0)
+        connection = HTTPConnection(*self.place, timeout=LONG)
         self.held.callback(connection.close)
         connection.request(method, path, headers=headers)
         return connection.getresponse()
@@ -73,7 +73,7 @@ def page(**options: Any) -> Generator[Served]:
             yield found
     finally:
         over.set()
-        thread.join(10.0)
+        thread.join(LONG)
         assert not thread.is_alive()
 
 
@@ -154,11 +154,11 @@ def test_more_connections_than_are_served_are_closed(sessions: Path, monkeypatch
     monkeypatch.setattr("bench.app.watch.server.MOST", 2)
     with page() as found, ExitStack() as held:
         idle = [held.enter_context(socket.create_connection(found.place)) for _ in range(2)]
-        with socket.create_connection(found.place, timeout=10.0) as third:
+        with socket.create_connection(found.place, timeout=LONG) as third:
             assert third.recv(1) == b"", "closed without an answer"
         for each in idle:
             each.close()
-        until(lambda: _status(found) == 200)
+        eventually(lambda: _status(found) == 200)
 
 
 def _status(found: Served) -> int:
@@ -188,7 +188,7 @@ def test_a_run_is_followed_from_its_begin_to_its_end_and_so_is_the_next(served: 
     assert served.state()["head"]["word"] == "NO RUN"
     specimen = Specimen()
     with session(tmp_path / "first") as server:
-        until(lambda: server.broadcast.has_clients)
+        eventually(lambda: server.broadcast.has_clients)
         server.broadcast.put(Opened(("ai0",), 1000.0, {}))
         _publish(
             server,
@@ -201,7 +201,7 @@ def test_a_run_is_followed_from_its_begin_to_its_end_and_so_is_the_next(served: 
         motion[25, TRACES.index("drift")] = 0.004
         motion[45] = np.nan
         server.broadcast.put(Traces(1, 2.0, 0.002, motion, motion, now(), 0.0, {"drift": 0.004}))
-        until(lambda: served.state()["log"] and served.state()["head"]["live"])
+        eventually(lambda: served.state()["log"] and served.state()["head"]["live"])
         found = served.state()
         assert (found["head"]["word"], found["head"]["level"]) == ("RUNNING", "good")
         assert HOSTILE.split("\u2028")[0] in found["log"][-1][2]
@@ -217,24 +217,24 @@ def test_a_run_is_followed_from_its_begin_to_its_end_and_so_is_the_next(served: 
         assert max(value for value in ordinates if value is not None) == found["traces"]["full"]
         # a question is shown, and nobody who only looks can answer it
         server.broadcast.put(Question(1, HOSTILE))
-        until(lambda: served.state()["head"]["question"])
+        eventually(lambda: served.state()["head"]["question"])
         assert not server._attending
         point = HarmonicPoint.model_construct(
             omega_rad_s=16.0, beta=0.4, status=PointStatus.STEADY, alpha_2=0.19, alpha_2_uncertainty=0.004,
             alpha_2_predicted=0.188, agrees=True,
         )  # fmt: skip
         _publish(server, PointFinished(point, time=3.0))
-        until(lambda: served.state()["points"]["marks"])
+        eventually(lambda: served.state()["points"]["marks"])
         assert "✓ agrees" in served.state()["verdict"]["sentence"]
         server.close(Ended("aborted", "STOP was pressed", {}, "", tmp_path), FAREWELL)
-        until(lambda: served.state()["verdict"]["trouble"])
+        eventually(lambda: served.state()["verdict"]["trouble"])
     found = served.state()
     assert not found["head"]["live"]
     assert "not live for" in found["head"]["age"]
     assert found["head"]["remaining"] == ""
     with session(tmp_path / "second") as server:
-        until(lambda: served.state()["head"]["run"][2] == "second")
-        until(lambda: served.state()["verdict"]["sentence"] == "no gain yet")
+        eventually(lambda: served.state()["head"]["run"][2] == "second")
+        eventually(lambda: served.state()["verdict"]["sentence"] == "no gain yet")
         assert served.state()["log"] == []
 
 
