@@ -182,6 +182,7 @@ class Converter(Parameters):
     bits: int = quantity(14, "1", "resolution", ge=8, le=16)
     range: float = quantity(10.0, "V", "largest input magnitude", gt=0)
     noise: float = quantity(0.0004, "V", "standard deviation of a sample due to input noise", ge=0)
+    clock_error: float = quantity(0.0, "1", "relative error of the sample clock", gt=-0.01, lt=0.01)
 
     @property
     def lsb(self) -> float:

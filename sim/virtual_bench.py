@@ -42,6 +42,11 @@ class VirtualBenchParameters(Parameters):
     filter_unit: FilterUnit = FilterUnit()
     converter: Converter = Converter()
 
+    @property
+    def tick_rate(self) -> float:
+        """True number of samples per second, which differs from `sample_rate` by the error of the sample clock."""
+        return self.sample_rate * (1.0 + self.converter.clock_error)
+
     @model_validator(mode="after")
     def _check_cutoff(self) -> "VirtualBenchParameters":
         rate = self.sample_rate
@@ -94,7 +99,7 @@ class VirtualBench:
         self._further = tuple(further)
         # the first generators do not depend on the number of sensors
         sources = SeedSequence(seed).spawn(7 + len(self._further))
-        rate = parameters.sample_rate
+        rate = parameters.tick_rate
         self._force_random, self._displacement_random, self._accelerometer_random = (
             np.random.default_rng(source) for source in sources[:3]
         )
@@ -179,7 +184,7 @@ class VirtualBench:
 
     def coast(self, seconds: float) -> None:
         """Simulate the bench at zero drive without sampling."""
-        self._move(np.zeros(max(1, round(seconds * self.parameters.sample_rate))))
+        self._move(np.zeros(max(1, round(seconds * self.parameters.tick_rate))))
 
     def mount(self, arrangement: Arrangement) -> None:
         """Set up this arrangement with the specimen at rest; a block held by its catch is put upright.
@@ -205,7 +210,7 @@ class VirtualBench:
     def arm(self) -> None:
         """Arm the bench: a part held by hand is released 3 to 5 s later."""
         if self._arrangement.held:
-            self._held_for = round(self._hand_random.uniform(*_LET_GO) * self.parameters.sample_rate)
+            self._held_for = round(self._hand_random.uniform(*_LET_GO) * self.parameters.tick_rate)
 
     def disarm(self) -> None:
         """Disarm the bench: a part that is still held by hand will not be released."""
@@ -226,7 +231,7 @@ class VirtualBench:
         p, n = self.parameters, volts.size
         reach = p.shaker.drive_range
         requests = p.shaker.gain * np.clip(np.ascontiguousarray(volts, dtype=np.float64), -reach, reach)
-        noise_level = p.shaker.force_noise * (0.5 * p.sample_rate) ** 0.5
+        noise_level = p.shaker.force_noise * (0.5 * p.tick_rate) ** 0.5
         noise = noise_level * self._force_random.standard_normal(n)
         self._samples = np.empty((n, self._kernel.COLUMNS))
         start = 0
@@ -242,7 +247,7 @@ class VirtualBench:
         """Advance through some of the ticks of a block."""
         self._mode = self._kernel.stream(
             self._plant,
-            1.0 / self.parameters.sample_rate,
+            1.0 / self.parameters.tick_rate,
             self._substeps,
             requests[ticks],
             noise[ticks],
@@ -256,8 +261,8 @@ class VirtualBench:
         """Voltages at the filter cards, shape (n_channels, n)."""
         p, s = self.parameters, np.ascontiguousarray(self._samples.T)
         volts = np.empty((4 + len(self._further), s.shape[1]))
-        volts[0] = p.displacement_sensor.volts(s[0], p.sample_rate, self._displacement_random)
-        volts[1] = p.accelerometer.volts(s[8], p.sample_rate, self._accelerometer_random)
+        volts[0] = p.displacement_sensor.volts(s[0], p.tick_rate, self._displacement_random)
+        volts[1] = p.accelerometer.volts(s[8], p.tick_rate, self._accelerometer_random)
         seen = self._laser_displacements(s)
         volts[2] = self._laser_1.read(seen[0], seen[1])
         volts[3] = self._laser_2.read(seen[2], seen[3])
@@ -265,7 +270,7 @@ class VirtualBench:
             motion = self._motion(s)
             for k, (sensor, random) in enumerate(zip(self._further, self._further_randoms, strict=True), 4):
                 value = motion[sensor.measures][_PLACES.index(sensor.place)]
-                volts[k] = sensor.volts(value, p.sample_rate, random)
+                volts[k] = sensor.volts(value, p.tick_rate, random)
         return volts
 
     def _motion(self, s: Array) -> dict[str, Array]:
@@ -278,6 +283,6 @@ class VirtualBench:
         velocity = np.stack((v, v + v1, v + v2))
         before = np.column_stack((self._velocities, velocity[:, :-1]))
         self._velocities = velocity[:, -1].copy()
-        acceleration = (velocity - before) * self.parameters.sample_rate
+        acceleration = (velocity - before) * self.parameters.tick_rate
         acceleration[0] = a
         return {"displacement": np.stack((x, x + u1, x + u2)), "velocity": velocity, "acceleration": acceleration}

@@ -26,7 +26,8 @@ _IDLE_TURN = 0.02
 class EmulatedBench:
     """A `Plant` around the virtual bench, advanced by every read, and by a separate thread in between.
 
-    One tick is one sample of the virtual bench; `clock_error` is the relative error of the tick rate.
+    One tick is one sample of the virtual bench; `clock_error` is the relative error of the tick rate, in addition to that
+    of the bench's own sample clock.
     """
 
     def __init__(
@@ -40,7 +41,7 @@ class EmulatedBench:
     ) -> None:
         self._bench = VirtualBench(parameters, specimen, seed)
         self._handling = SpecimenHandling(specimen, spring_factor)
-        self._rate = parameters.sample_rate * (1.0 + clock_error)
+        self._rate = parameters.tick_rate * (1.0 + clock_error)
         kept = round(_KEPT * parameters.sample_rate)
         self._counts = History(kept, self.terminals, np.int16)
         self._displacements = History(kept, 4, np.float64)

@@ -190,3 +190,10 @@ def test_a_further_sensor_measures_the_motion_of_its_place(place: str) -> None:
     assert np.abs(velocity - truth.v - speed).max() < 0.02 * np.abs(velocity).max()
     assert np.abs(displacement - truth.x - relative).max() < 0.02 * np.abs(displacement).max()
     assert np.abs(np.cumsum(acceleration) / rate - velocity).max() < 0.02 * np.abs(velocity).max()
+
+
+def test_an_error_of_the_sample_clock_is_another_rate_under_the_same_name() -> None:
+    fast = bench_with(Specimen(beta=0.4), converter={"clock_error": 0.005})
+    true = bench_with(Specimen(beta=0.4), sample_rate=2010.0)
+    np.testing.assert_array_equal(fast.run(kick(800)), true.run(kick(800)))
+    assert fast.parameters.sample_rate == RATE
