@@ -69,6 +69,29 @@ class CycleMap:
         _, _, directions = np.linalg.svd(np.stack((effect.real, effect.imag)))
         return complex(directions[0, 0], directions[0, 1])
 
+    def excitation(self, cycles: int) -> tuple[NDArray[np.complex128], float]:
+        """Controls of successive cycles, shape (cycles,), after which the state deviates along the slowest pair only.
+
+        The largest control has the magnitude 1. Also returns the relative deviation of y that they cause, per unit of
+        that control. The phase of the deviation is the one that is reached with the smallest controls.
+        """
+        multipliers, vectors = np.linalg.eig(self.transition)
+        pair = vectors[:, int(np.argmax(np.abs(multipliers)))]
+        plane: Array = np.stack((np.real(pair), np.imag(pair)), axis=1)
+        before, now = self.inputs
+        effects = list[Array]()
+        power = np.eye(self.transition.shape[0])
+        for _ in range(cycles):
+            # the cycle after the controls still contains the change back to zero
+            effects.append(power @ (self.transition @ now + before))
+            power = power @ self.transition
+        controls = np.linalg.pinv(np.hstack(effects[::-1])) @ plane
+        _, _, directions = np.linalg.svd(controls)
+        found: Array = (controls @ directions[-1]).reshape(-1, 2)
+        largest = float(np.hypot(found[:, 0], found[:, 1]).max())
+        deviation = float(np.linalg.norm(self.outputs @ plane @ directions[-1]) / np.linalg.norm(self.orbit))
+        return (found[:, 0] + 1j * found[:, 1]) / largest, deviation / largest
+
 
 def coefficients(u1: NDArray[np.complex128], drift: NDArray[np.complex128]) -> Array:
     """Return the vector y, shape (12,), for complex harmonics of u1 and drift [m], each of shape (OBSERVED,) or longer.

@@ -64,6 +64,7 @@ COMMANDS = (
     Command("run: free-rocking", "run free-rocking --out NEW", 8.0, drives=True),
     Command("run: free-vibration", "run free-vibration --out NEW", 8.0, drives=True),
     Command("run: identify", "run identify --out NEW", 8.0, drives=True),
+    Command("run: stability", "run stability --omega 15 --no-bisect --out NEW", 9.0, drives=True),
     Command("run: json", f"run harmonic {_POINT} --json --out NEW", 9.0, drives=True),
     Command("run: dry", "run harmonic --dry-run", 20.0),
     Command("run: first", f"run harmonic {_POINT} --dry-run", 14.0, cold=True),

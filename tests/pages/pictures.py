@@ -96,6 +96,7 @@ PICTURES = (
         _plot("attractor.png", "attractor", "--omega", "14:15.6:65", "--beta", "0.97", "--members", "0"),
     ),
     Picture("docs/harmonic.md", "docs/images/hold.png", _hold),
+    Picture("docs/stability.md", "docs/images/stability.png", _figure("stability.png", "stability")),
     *(
         Picture("docs/window.md", f"docs/images/{name}", _window(name), repeats=False)
         for name in ("window-run.png", "window-queue.png", "window-compare.png")

@@ -161,14 +161,14 @@ def slow(specimen: Specimen, omega: float, amplitude: float) -> bool:
 def demands_of(
     found: Sequence[Trial],
     configuration: BenchConfiguration,
-    steady: Callable[[float | None, float], Travel | None],
+    steady: Callable[[float | None, float], Travel | None] | None = None,
     progress: Progress = silent,
 ) -> tuple[Demand, ...]:
     """Demands of all trials.
 
-    `steady` returns the steady motion at a stiffness ratio and frequency [rad/s]. A drawn specimen and the error of its
-    drive are used for all stages. Raises InvalidInput for a table model that cannot be read or does not cover the
-    frequencies.
+    `steady` returns the steady motion at a stiffness ratio and frequency [rad/s], if it is also evaluated. A drawn
+    specimen and the error of its drive are used for all stages. Raises InvalidInput for a table model that cannot be
+    read or does not cover the frequencies.
     """
     response = response_of(configuration)
     factors = np.concatenate(([1.0], 1.0 + DRIVE * np.random.default_rng(SEED).uniform(-1.0, 1.0, DRAWS)))
@@ -178,7 +178,7 @@ def demands_of(
         _trial_demands(
             trial,
             travels,
-            None if trial.steady is None else steady(trial.beta, trial.steady),
+            None if steady is None or trial.steady is None else steady(trial.beta, trial.steady),
             factors,
             configuration,
             response,

@@ -1,0 +1,126 @@
+"""Predicted multipliers of a stability test, and the places at which the predicted or measured modulus passes 1."""
+
+from cmath import phase
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import hypot, nan
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.analysis.uncertainty import COVERAGE
+from sim.gain import predict_gain
+from sim.knowledge import SpecimenKnowledge
+from sim.shaker import Shaker
+from sim.specimen import Specimen
+from sim.steady import NoOrbit, Orbit, rocking_orbit
+from sim.table_orbit import table_orbit
+
+Array = NDArray[np.float64]
+
+STEP = 0.002
+"""Relative change of the amplitude in the finite difference of its sensitivity."""
+
+
+@dataclass(frozen=True)
+class Predicted:
+    """Multipliers of an orbit: on `fixed` ground and, if the shaker is known, on the `table`; `uncertainty` is the
+    standard uncertainty of the modulus due to the specimen. `slope` and `turn` [rad] are the derivatives of modulus and
+    angle with respect to the logarithm of the amplitude; all three are for fixed ground.
+    """
+
+    fixed: complex
+    table: complex | None
+    uncertainty: float
+    slope: float
+    turn: float
+
+    @property
+    def multiplier(self) -> complex:
+        """Multiplier on the table if it is known, otherwise on fixed ground."""
+        return self.fixed if self.table is None else self.table
+
+
+def rocking(specimen: Specimen, omega: float, amplitude: float) -> Orbit | None:
+    """The rocking orbit at `omega` [rad/s] and `amplitude` [m/s2]; None if there is none."""
+    branch = predict_gain(specimen, omega, amplitude).rocking
+    return None if branch is None else branch.orbit
+
+
+def on_table(orbit: Orbit, shaker: Shaker | None, harmonics: int) -> complex | None:
+    """Slowest multiplier on the table of `shaker`; None without a shaker or an orbit on its table."""
+    if shaker is None:
+        return None
+    try:
+        return table_orbit(orbit, shaker, harmonics).slowest
+    except NoOrbit:
+        return None
+
+
+def predicted(orbit: Orbit, known: SpecimenKnowledge, shaker: Shaker | None, harmonics: int) -> Predicted:
+    """Multipliers of `orbit`; the uncertainty is to first order along independent directions (GUM 5.1.4, note 2)."""
+    sides = [(_slowest(more, orbit), _slowest(less, orbit)) for more, less in known.deviations(orbit.specimen)]
+    more, less = (_slowest(orbit.specimen, orbit, 1.0 + step) for step in (STEP, -STEP))
+    return Predicted(
+        fixed=orbit.slowest,
+        table=on_table(orbit, shaker, harmonics),
+        uncertainty=hypot(*(0.5 * (abs(one) - abs(other)) for one, other in sides)),
+        slope=(abs(more) - abs(less)) / (2.0 * STEP),
+        turn=(phase(more) - phase(less)) / (2.0 * STEP),
+    )
+
+
+def _slowest(specimen: Specimen, orbit: Orbit, factor: float = 1.0) -> complex:
+    """Slowest multiplier on fixed ground of `specimen` at the frequency of `orbit` and `factor` times its amplitude."""
+    try:
+        return rocking_orbit(specimen, orbit.omega, factor * orbit.amplitude, guess=orbit).slowest
+    except NoOrbit:
+        return complex(nan, nan)
+
+
+@dataclass(frozen=True)
+class Boundary:
+    """A place, frequency or amplitude, at which the modulus of the dominant multiplier passes 1, with its expanded
+    uncertainty (k = 2), between the measured places `low` and `high`.
+    """
+
+    place: float
+    uncertainty: float
+    low: float
+    high: float
+
+
+def boundaries(places: Sequence[float], moduli: Sequence[float], uncertainties: Sequence[float]) -> list[Boundary]:
+    """Boundaries between adjacent `places`, ascending, by linear interpolation of the moduli with their standard
+    `uncertainties`; NaN moduli are omitted.
+
+    The errors of the moduli are regarded as fully correlated. The uncertainty includes half the difference between
+    linear and quadratic interpolation (through the nearest third point).
+    """
+    known = [k for k in sorted(range(len(places)), key=places.__getitem__) if moduli[k] == moduli[k]]
+    x, y, u = (
+        np.array([float(values[k]) for k in known], dtype=np.float64) for values in (places, moduli, uncertainties)
+    )
+    found = list[Boundary]()
+    for k in range(len(known) - 1):
+        if (y[k] < 1.0) == (y[k + 1] < 1.0):
+            continue
+        slope = (y[k + 1] - y[k]) / (x[k + 1] - x[k])
+        share = (1.0 - y[k]) / (y[k + 1] - y[k])
+        place = float(x[k] + share * (x[k + 1] - x[k]))
+        # the largest contribution, the scale of the accelerometer, is common to all points
+        shifted = ((1.0 - share) * u[k] + share * u[k + 1]) / abs(slope)
+        bent = 0.5 * abs(_bend(x, y, k, place)) / abs(slope)
+        found.append(Boundary(place, COVERAGE * hypot(shifted, bent), float(x[k]), float(x[k + 1])))
+    return found
+
+
+def _bend(x: Array, y: Array, k: int, place: float) -> float:
+    """Difference of quadratic and linear interpolation at `place` between x[k] and x[k + 1]."""
+    others = [j for j in range(x.size) if j not in (k, k + 1)]
+    if not others:
+        return 0.0
+    third = min(others, key=lambda j: abs(x[j] - place))
+    linear = y[k] + (y[k + 1] - y[k]) / (x[k + 1] - x[k]) * (x[third] - x[k])
+    second = (y[third] - linear) / ((x[third] - x[k]) * (x[third] - x[k + 1]))
+    return float(second * (place - x[k]) * (place - x[k + 1]))

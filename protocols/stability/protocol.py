@@ -1,0 +1,153 @@
+"""Stability protocol: multipliers of rocking orbits, measured after the release of held motions."""
+
+from enum import StrEnum
+from typing import Annotated
+
+from pydantic import Field, field_validator, model_validator
+
+from bench.protocol import Axis, Protocol, RunView, deferred
+from protocols.common.sine.settings import SineParameters
+from sim.errors import InvalidInput
+from sim.parameters import COUPLING, Parameters, each_once, quantity
+
+Frequency = Annotated[float, Field(gt=0, le=40)]
+Factor = Annotated[float, Field(ge=0.1, le=5)]
+
+
+class StabilityPoints(Parameters):
+    """Points of a stability test."""
+
+    omega: tuple[Frequency, ...] = quantity(
+        (15.0, 15.2, 15.4, 15.6),
+        "rad/s",
+        "circular frequencies of the base motion; several only at a single amplitude",
+        min_length=1,
+    )
+    amplitude_factor: tuple[Factor, ...] = quantity(
+        (1.01,),
+        "1",
+        "amplitudes of the table acceleration, relative to the uplift acceleration g/lambda; several only at a single "
+        "frequency",
+        min_length=1,
+    )
+    beta: float = quantity(0.97, "1", "stiffness ratio k_C/k1 of the coupling spring", gt=0, le=100, usual=COUPLING)
+
+    _each_once = field_validator("omega", "amplitude_factor")(each_once)
+
+
+class StabilityParameters(SineParameters, StabilityPoints):
+    """Orbits held at one spring, over frequency or amplitude, then released to measure their multipliers."""
+
+    settle_limit: float = quantity(30.0, "s", "longest wait for the steady state before the hold", gt=0, le=3600)
+    released_cycles: int = quantity(60, "1", "largest number of cycles observed after the release", ge=24, le=1000)
+    bisect: bool = quantity(
+        True, "", "whether further points are measured between those between which the stability changes"
+    )
+    bracket: float = quantity(
+        0.003,
+        "1",
+        "distance of these points, relative to their frequency or amplitude, at which the bisection ends",
+        ge=1e-4,
+        le=0.5,
+    )
+
+    @model_validator(mode="after")
+    def _check_axes(self) -> "StabilityParameters":
+        if len(self.omega) > 1 and len(self.amplitude_factor) > 1:
+            raise InvalidInput(
+                "amplitude_factor",
+                self.amplitude_factor,
+                "several amplitudes are possible only at a single frequency: give one omega",
+            )
+        return self
+
+
+class OrbitStatus(StrEnum):
+    """Outcome of a point."""
+
+    MEASURED = "measured"
+    NOT_HELD = "not held"
+    NOT_MEASURABLE = "not measurable"
+    OVERTURNED = "overturned"
+
+
+_EXPANDED = "expanded uncertainty (k = 2)"
+
+
+class StabilityPoint(Parameters):
+    """Measured and predicted multiplier of the rocking orbit at one frequency and amplitude.
+
+    Values that were not measured are None. The prediction is for the nominal amplitude.
+    """
+
+    omega_rad_s: float = quantity(..., "rad/s", "circular frequency of the base motion")
+    amplitude_factor: float = quantity(..., "1", "nominal amplitude relative to the uplift acceleration g/lambda")
+    beta: float = quantity(..., "1", "stiffness ratio of the coupling spring")
+    status: OrbitStatus = quantity(..., "", "outcome of the point")
+    bisected: bool = quantity(False, "", "whether the point was added by the bisection")
+    modulus: float | None = quantity(
+        None, "1", "modulus of the dominant multiplier: fraction of a deviation that remains after a cycle"
+    )
+    modulus_uncertainty: float | None = quantity(None, "1", f"{_EXPANDED} of the modulus")
+    angle_rad: float | None = quantity(None, "rad", "argument of the multiplier: rotation of the deviation in a cycle")
+    angle_uncertainty_rad: float | None = quantity(None, "rad", f"{_EXPANDED} of the angle")
+    modulus_predicted: float | None = quantity(
+        None, "1", "predicted modulus on the simulated table; with hardware, on fixed ground"
+    )
+    modulus_predicted_uncertainty: float | None = quantity(
+        None, "1", f"{_EXPANDED} of the predicted modulus, due to the specimen"
+    )
+    angle_predicted_rad: float | None = quantity(None, "rad", "predicted argument of the multiplier")
+    fixed_modulus: float | None = quantity(None, "1", "predicted modulus on fixed ground")
+    agrees: bool | None = quantity(
+        None, "1", "whether the moduli differ by no more than their combined uncertainty (root sum of squares)"
+    )
+    uncertainty_parts: str = quantity(
+        "", "", "standard uncertainty of the modulus by contribution, largest first, as JSON"
+    )
+    released_cycles: int = quantity(0, "1", "number of cycles after the release used for the multiplier")
+    pairs: int | None = quantity(None, "1", "number of pairs of multipliers in the fit, 1 or 2")
+    autocorrelation: float | None = quantity(
+        None, "1", "correlation of the residuals of successive cycles; near 0 if the fit describes the motion"
+    )
+    residual_m: float | None = quantity(None, "m", "rms residual of a Fourier coefficient of u1 or drift")
+    drift_peak_m: float | None = quantity(None, "m", "peak drift of the held orbit")
+    amplitude_m_s2: float | None = quantity(None, "m/s2", "achieved amplitude of the table on the held orbit")
+    amplitude_slope: float | None = quantity(
+        None, "1", "predicted derivative of the modulus with respect to the logarithm of the amplitude"
+    )
+    control_share: float | None = quantity(
+        None, "1", "rms of the control over the measured cycles of the hold, relative to the table's amplitude"
+    )
+    captured_cycles: int | None = quantity(None, "1", "number of cycles from the beginning of the hold to the capture")
+    starts_tried: int = quantity(0, "1", "number of starts tried")
+    reason: str = quantity("", "", "remarks, or the reason why there is no multiplier")
+
+
+PROTOCOL = Protocol(
+    name="stability",
+    summary="Multipliers of rocking orbits, stable or not, and the boundary between them, against prediction.",
+    details=(
+        "At each frequency or amplitude, the rocking motion is held on its orbit by small corrections once per cycle, "
+        "deflected slightly and released. From the growth or decay of the deviation follow modulus and angle of the "
+        "dominant multiplier. Where the modulus passes 1 between two points, further points bisect the interval. "
+        "Without options, it brackets the upper end of the unstable window at beta 0.97 on the simulated bench."
+    ),
+    example="--beta 0.97 --omega 15:15.6:4 --yes",
+    parameters=StabilityParameters,
+    point=StabilityPoint,
+    prepare=deferred("protocols.stability.experiment:StabilityTest"),
+    figures=("stability.png",),
+    events=("protocols.common.sine.holding:HoldCycle",),
+    report=deferred("protocols.stability.results:stability_sections"),
+    view=RunView(
+        headline="modulus",
+        labels={
+            "modulus": "multiplier |μ|",
+            "angle_rad": "angle of μ",
+            "modulus_predicted": "predicted |μ|",
+            "angle_predicted_rad": "predicted angle of μ",
+        },
+        matrix=(Axis("amplitude_factor", "amplitude_factor", "A {:g}"), Axis("omega", "omega_rad_s", "{:g} rad/s")),
+    ),
+)

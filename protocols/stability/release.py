@@ -1,0 +1,109 @@
+"""Release of a held motion: a deflection along the slowest pair of multipliers, and the free cycles after it."""
+
+from collections.abc import Generator
+from dataclasses import dataclass
+from math import hypot
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.analysis.multiplier import BOUND, Multiplier, dominant_multiplier, linear_part
+from bench.analysis.signals import DRIFT
+from bench.control.stabiliser import BLEND, observed
+from bench.engine.steps import Dwell, Fallen, Measured, Outcome, Publish, SetHarmonics, Step
+from bench.events import StepStarted
+from protocols.common.sine.holding import Hold, HoldCycle
+from protocols.common.sine.settling import TableState
+from sim.cycle_map import CycleMap
+
+Array = NDArray[np.float64]
+
+DEFLECTION = 8
+"""Number of cycles in which the motion is deflected. At least as many controls as half the states of table and
+specimen are required to leave the other multipliers unexcited; more of them are smaller.
+"""
+
+START, LEAST = 0.7, 0.02
+"""Deviation at the release, relative to the largest deviation of a linear motion: of an orbit predicted as stable, and
+the smallest for an unstable one, in which the deviation then grows.
+"""
+
+LOST = 2.0
+"""Deviation at which the observation ends, relative to the largest deviation of a linear motion."""
+
+
+@dataclass(frozen=True, eq=False)
+class Released:
+    """Cycles after a release: their coefficients, shape (n, m), and those of the orbit, shape (m,)."""
+
+    series: Array
+    orbit: Array
+
+    @property
+    def multiplier(self) -> Multiplier | None:
+        """Dominant multiplier of the cycles in which the motion is linear."""
+        return dominant_multiplier(self.series[linear_part(self.series, self.orbit)])
+
+
+def deflection(found: CycleMap, cycles: int, authority: float) -> NDArray[np.complex128]:
+    """Controls of the cycles before a release, shape (DEFLECTION,), of at most `authority`.
+
+    The deviation at the release is such that it remains linear for about `cycles` cycles.
+    """
+    controls, effect = found.excitation(DEFLECTION)
+    share = np.clip(abs(found.slowest) ** -float(cycles), LEAST / BOUND, START)
+    return controls * min(float(share) * BOUND / effect, authority)
+
+
+def release(
+    run: Hold, table: TableState, beta: float, largest: float, cycles: int, authority: float
+) -> Generator[Step, Outcome, Released | Fallen]:
+    """Deflect the motion held by `run`, release it, and observe up to `cycles` cycles without control.
+
+    The observation ends early when the deviation is no longer linear or the drift exceeds `largest` [m].
+    """
+    sine, count = run.sine, run.monitor.cycles
+    orbit = np.mean([observed(cycle, table.turn) for cycle in run.used], axis=0)
+    size = float(np.linalg.norm(orbit))
+    controls = (*deflection(run.design.cycle_map, cycles, authority), 0j)
+    yield Publish(StepStarted(f"beta = {beta:g} at {sine.omega:g} rad/s: deflecting, then observing the deviation"))
+    rows = list[Array]()
+    first, *others = run.shares
+    for number in range(len(controls) + 1 + cycles):
+        if number < len(controls):
+            control = complex(controls[number])
+            yield SetHarmonics((first + control / table.answer, *others), count + 1 + number, BLEND)
+        outcome = yield Dwell(1)
+        if not isinstance(outcome, Measured):
+            return Fallen()
+        # a correction takes effect one cycle after the one that is measured next
+        played = abs(controls[number - 1]) if 0 < number <= len(controls) else 0.0
+        for cycle in outcome.cycles:
+            y = observed(cycle, table.turn)
+            deviation, drift = float(np.linalg.norm(y - orbit)) / size, float(cycle.extreme[DRIFT])
+            yield Publish(HoldCycle(sine.omega, beta, count + number + 1, drift, deviation, float(played)))
+            if number > len(controls):
+                rows.append(y)
+            if deviation > LOST * BOUND or drift > largest:
+                return Released(np.array(rows).reshape(-1, orbit.size), orbit)
+        if not outcome.cycles and number > len(controls):
+            # the fit requires successive cycles
+            break
+    return Released(np.array(rows).reshape(-1, orbit.size), orbit)
+
+
+def parts_of(found: Multiplier, amplitude_slope: float, table_scale: float) -> dict[str, float]:
+    """Standard uncertainties of the modulus by contribution, largest first: noise of the cycles, and the amplitude of
+    the table, of which `table_scale` is the relative standard uncertainty. An unknown slope (NaN) omits the latter.
+    """
+    slope = 0.0 if amplitude_slope != amplitude_slope else abs(amplitude_slope)
+    parts = {
+        "scatter of the cycles": found.modulus_uncertainty,
+        "amplitude of the table": slope * table_scale,
+    }
+    return dict(sorted(parts.items(), key=lambda part: -part[1]))
+
+
+def combined(parts: dict[str, float]) -> float:
+    """Combined standard uncertainty of independent contributions."""
+    return hypot(*parts.values())

@@ -1,0 +1,251 @@
+# pyright: reportUnknownMemberType=false
+"""Results of a stability test: text table, figure, and report section."""
+
+from cmath import rect
+from collections.abc import Mapping, Sequence
+from math import degrees, nan
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.analysis.uncertainty import COVERAGE
+from bench.datafile.tables import arrays
+from bench.document.campaign import Campaign
+from bench.document.document import Column, Listing, Part, Picture, Section, Table
+from bench.document.typography import plain, with_uncertainty
+from bench.figures.style import BLACK, BLUE, GREY, VERMILLION, new_figure, set_grid
+from bench.figures.text_table import TextColumn, text_table
+from protocols.common.budgets import budget_parts, budgeted
+from protocols.stability.prediction import Boundary, boundaries
+from protocols.stability.protocol import StabilityPoint
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Curve = Mapping[str, NDArray[Any]]
+
+ABSENT = "-"
+
+_COLUMNS = (
+    TextColumn("omega", "rad/s"),
+    TextColumn("amplitude", "1"),
+    TextColumn("status", words=True),
+    TextColumn("|mu|", "1"),
+    TextColumn("U (k=2)", "1"),
+    TextColumn("predicted", "1"),
+    TextColumn("U (k=2)", "1"),
+    TextColumn("angle", "deg"),
+    TextColumn("U (k=2)", "deg"),
+    TextColumn("predicted", "deg"),
+    TextColumn("agrees", words=True),
+)
+
+
+def by_amplitude(points: Sequence[StabilityPoint]) -> bool:
+    """Whether the test is over amplitude; otherwise it is over frequency."""
+    return len({point.amplitude_factor for point in points}) > 1
+
+
+def measured_boundaries(points: Sequence[StabilityPoint]) -> list[Boundary]:
+    """Boundaries between the measured points, over frequency [rad/s] or amplitude factor."""
+    over = by_amplitude(points)
+    known = [point for point in points if point.modulus is not None]
+    return boundaries(
+        [point.amplitude_factor if over else point.omega_rad_s for point in known],
+        [point.modulus or nan for point in known],
+        [(point.modulus_uncertainty or 0.0) / COVERAGE for point in known],
+    )
+
+
+def predicted_boundaries(curve: Curve, ground: str) -> list[float]:
+    """Places at which a predicted curve passes 1; `ground` is "fixed" or "table"."""
+    over = np.unique(curve["amplitude_factor"]).size > 1
+    places, moduli = curve["amplitude_factor" if over else "omega_rad_s"], curve[f"{ground}_modulus"]
+    return [each.place for each in boundaries(places.tolist(), moduli.tolist(), [0.0] * len(places))]
+
+
+def stability_table(points: Sequence[StabilityPoint], curve: Curve) -> str:
+    """Text table with a row per point, followed by the boundaries and remarks."""
+    if not points:
+        return "No point was measured."
+    rows = sorted(points, key=lambda point: (point.omega_rad_s, point.amplitude_factor))
+    lines = [text_table(_COLUMNS, map(_cells, rows)), "", *boundary_texts(rows, curve)]
+    lines += [f"{point.omega_rad_s:g} rad/s: {point.reason}" for point in rows if point.reason]
+    return "\n".join(lines)
+
+
+def boundary_texts(points: Sequence[StabilityPoint], curve: Curve) -> list[str]:
+    """Statements on the measured and the predicted boundaries."""
+    over = by_amplitude(points)
+    unit, name = ("", "amplitude factor") if over else (" rad/s", "frequency")
+    found = measured_boundaries(points)
+    lines = [
+        f"boundary of stability: {name} {each.place:.4f} +- {each.uncertainty:.4f}{unit} (k = 2), between the points "
+        f"{each.low:.4f} and {each.high:.4f}{unit}"
+        for each in found
+    ]
+    if not found:
+        stable = [point.modulus < 1.0 for point in points if point.modulus is not None]
+        if stable:
+            lines.append(f"no boundary was crossed: every measured orbit is {'stable' if stable[0] else 'unstable'}")
+    for ground, words in (("table", "on the simulated table"), ("fixed", "on fixed ground")):
+        if np.isfinite(curve[f"{ground}_modulus"]).any():
+            places = predicted_boundaries(curve, ground)
+            text = ", ".join(f"{place:.4f}{unit}" for place in places) or "none in this range"
+            lines.append(f"predicted boundary {words}: {text}")
+    return lines
+
+
+def _cells(point: StabilityPoint) -> list[str]:
+    def number(value: float | None, form: str) -> str:
+        return ABSENT if value is None else format(value, form)
+
+    def angle(value: float | None, form: str) -> str:
+        return ABSENT if value is None else format(degrees(value), form)
+
+    return [
+        f"{point.omega_rad_s:.4f}",
+        f"{point.amplitude_factor:.4f}",
+        str(point.status),
+        number(point.modulus, ".4f"),
+        number(point.modulus_uncertainty, ".4f"),
+        number(point.modulus_predicted, ".4f"),
+        number(point.modulus_predicted_uncertainty, ".4f"),
+        angle(point.angle_rad, ".2f"),
+        angle(point.angle_uncertainty_rad, ".2f"),
+        angle(point.angle_predicted_rad, ".2f"),
+        ABSENT if point.agrees is None else "yes" if point.agrees else "NO <",
+    ]
+
+
+def stability_figure(points: Sequence[StabilityPoint], curve: Curve) -> "Figure":
+    """Modulus over frequency or amplitude with the boundaries and their intervals, and the multipliers in the complex
+    plane; a filled marker is an unstable orbit.
+    """
+    figure = new_figure(9.0, 3.8)
+    left, right = figure.subplots(1, 2, width_ratios=(1.5, 1.0))
+    _draw_moduli(left, points, curve)
+    _draw_plane(right, points, curve)
+    return figure
+
+
+def _draw_moduli(panel: "Axes", points: Sequence[StabilityPoint], curve: Curve) -> None:
+    over = np.unique(curve["amplitude_factor"]).size > 1
+    places = curve["amplitude_factor" if over else "omega_rad_s"]
+    for ground, label, colour, dash in (
+        ("fixed", "predicted, fixed ground", BLUE, "--"),
+        ("table", "predicted, this table", VERMILLION, "-"),
+    ):
+        if np.isfinite(curve[f"{ground}_modulus"]).any():
+            panel.plot(places, curve[f"{ground}_modulus"], color=colour, linestyle=dash, linewidth=1.4, label=label)
+    for number, each in enumerate(measured_boundaries(points)):
+        panel.axvspan(each.place - each.uncertainty, each.place + each.uncertainty, color=GREY, alpha=0.35, lw=0)
+        label = "_" if number else "measured boundary (k = 2)"
+        panel.axvline(each.place, color=GREY, linewidth=1.0, label=label)
+    known = [point for point in points if point.modulus is not None]
+    for unstable, label in ((False, "measured, stable"), (True, "measured, unstable")):
+        shown = [point for point in known if ((point.modulus or 0.0) > 1.0) is unstable]
+        if shown:
+            panel.errorbar(
+                [point.amplitude_factor if over else point.omega_rad_s for point in shown],
+                [point.modulus or nan for point in shown],
+                [point.modulus_uncertainty or 0.0 for point in shown],
+                fmt="o",
+                color=BLACK,
+                markerfacecolor=BLACK if unstable else "white",
+                markersize=5,
+                capsize=2,
+                label=label,
+            )
+    panel.axhline(1.0, color=BLACK, linewidth=0.8)
+    panel.set_xlabel("amplitude / uplift acceleration" if over else r"$\Omega$  [rad/s]")
+    panel.set_ylabel(r"$|\mu|$")
+    panel.legend(fontsize=7)
+    set_grid(panel)
+
+
+def _draw_plane(panel: "Axes", points: Sequence[StabilityPoint], curve: Curve) -> None:
+    angles = np.linspace(0.0, np.pi, 400)
+    panel.plot(np.cos(angles), np.sin(angles), color=BLACK, linewidth=0.8)
+    for ground, colour, dash in (("fixed", BLUE, "--"), ("table", VERMILLION, "-")):
+        modulus, angle = curve[f"{ground}_modulus"], curve[f"{ground}_angle_rad"]
+        panel.plot(modulus * np.cos(angle), modulus * np.sin(angle), color=colour, linestyle=dash, linewidth=1.4)
+    shown = [rect(point.modulus, point.angle_rad) for point in points if point.modulus and point.angle_rad]
+    for value in shown:
+        face = BLACK if abs(value) > 1.0 else "white"
+        panel.plot(value.real, value.imag, "o", color=BLACK, markerfacecolor=face, markersize=5)
+    if shown:
+        centre = sum(shown) / len(shown)
+        half = max(1.4 * max(abs(value - centre) for value in shown), 0.08)
+        panel.set_xlim(centre.real - half, centre.real + half)
+        panel.set_ylim(centre.imag - half, centre.imag + half)
+    panel.locator_params(nbins=4)
+    panel.set_aspect("equal")
+    panel.set_xlabel(r"Re $\mu$")
+    panel.set_ylabel(r"Im $\mu$")
+    set_grid(panel)
+
+
+def stability_sections(campaign: Campaign) -> list[Section]:
+    """Report section with boundaries, figure, points and uncertainty budget."""
+    if not campaign.points:
+        return []
+    points = [StabilityPoint.model_validate(row) for row in campaign.points]
+    points.sort(key=lambda point: (point.omega_rad_s, point.amplitude_factor))
+    curve = arrays(campaign.record.tables["prediction"])
+    parts: list[Part] = [Listing(boundary_texts(points, curve))]
+    caption = (
+        "Multipliers of the held orbits after their release (markers, k = 2; filled: unstable) and their prediction "
+        "(lines): modulus with the boundary and its interval, and the complex plane with the unit circle."
+    )
+    parts.append(Picture(stability_figure(points, curve), caption, "Multipliers against frequency or amplitude."))
+    parts.append(_points_table(points))
+    budgets = [
+        each
+        for point in points
+        for each in budgeted(
+            f"{point.omega_rad_s:.4g} rad/s, {point.amplitude_factor:g}",
+            point.modulus,
+            point.uncertainty_parts,
+            point.modulus_uncertainty,
+        )
+    ]
+    parts += budget_parts("|μ|", budgets)
+    remarks = [f"{point.omega_rad_s:g} rad/s: {point.reason}" for point in points if point.reason]
+    return [Section("stability", "Stability of the rocking orbits", [*parts, *([Listing(remarks)] if remarks else [])])]
+
+
+def _points_table(points: Sequence[StabilityPoint]) -> Table:
+    def value(number: float | None, doubt: float | None, by: float = 1.0) -> str:
+        return ABSENT if number is None else with_uncertainty(by * number, by * (doubt or 0.0))
+
+    turn = degrees(1.0)
+    rows = [
+        [
+            f"{point.omega_rad_s:.4g}",
+            f"{point.amplitude_factor:.4g}",
+            str(point.status),
+            value(point.modulus, point.modulus_uncertainty),
+            value(point.modulus_predicted, point.modulus_predicted_uncertainty),
+            value(point.angle_rad, point.angle_uncertainty_rad, turn),
+            plain(None if point.angle_predicted_rad is None else turn * point.angle_predicted_rad),
+            str(point.released_cycles),
+            plain(point.autocorrelation, 2),
+        ]
+        for point in points
+    ]
+    columns = [
+        Column("Ω", "rad/s"),
+        Column("A"),
+        Column("status", words=True),
+        Column("|μ|"),
+        Column("|μ| predicted"),
+        Column("angle", "°"),
+        Column("angle predicted", "°"),
+        Column("cycles"),
+        Column("autocorrelation"),
+    ]
+    caption = "Multipliers of the orbits (k = 2); A is the amplitude relative to the uplift acceleration"
+    return Table(caption, columns, rows)

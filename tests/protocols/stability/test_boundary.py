@@ -1,0 +1,136 @@
+"""Boundaries from points and curves, predicted multipliers, and the deflection before a release."""
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from bench.config.model import BenchConfiguration
+from bench.config.sections import Acquisition
+from protocols.common.sine.holding import prepared
+from protocols.stability.experiment import StabilityTest
+from protocols.stability.plan import Place, StabilityPlan
+from protocols.stability.prediction import boundaries, predicted, rocking
+from protocols.stability.protocol import OrbitStatus, StabilityParameters, StabilityPoint
+from protocols.stability.release import DEFLECTION, deflection
+from protocols.stability.results import boundary_texts, measured_boundaries
+from sim.cycle_map import cycle_map
+from sim.errors import InvalidInput
+from sim.knowledge import SpecimenKnowledge
+from sim.specimen import Specimen
+from sim.steady import Orbit
+
+AMPLITUDE = 1.01 * Specimen().uplift_acceleration
+
+
+def orbit(omega: float = 15.0, beta: float = 0.97) -> Orbit:
+    found = rocking(Specimen().coupled(beta), omega, AMPLITUDE)
+    assert found is not None
+    return found
+
+
+def point(omega: float, modulus: float | None, uncertainty: float = 0.002) -> StabilityPoint:
+    status = OrbitStatus.NOT_HELD if modulus is None else OrbitStatus.MEASURED
+    return StabilityPoint(
+        omega_rad_s=omega,
+        amplitude_factor=1.01,
+        beta=0.97,
+        status=status,
+        modulus=modulus,
+        modulus_uncertainty=None if modulus is None else uncertainty,
+    )
+
+
+def test_a_boundary_on_a_straight_line_has_the_uncertainty_of_the_moduli_over_the_slope() -> None:
+    (found,) = boundaries([15.6, 15.0, 15.2], [0.98, 1.04, 1.02], [0.001] * 3)
+    assert found.place == pytest.approx(15.4)
+    assert found.uncertainty == pytest.approx(2.0 * 0.001 / 0.1)
+    assert (found.low, found.high) == (15.2, 15.6)
+
+
+def test_a_bent_curve_adds_its_deviation_from_the_chord() -> None:
+    (found,) = boundaries([0.0, 1.0, 2.0], [0.97, 1.01, 1.07], [0.0] * 3)
+    # the parabola through the three points, 0.97 + 0.03 x + 0.01 x^2
+    exact = (-0.03 + np.sqrt(0.03**2 + 4.0 * 0.01 * 0.03)) / 0.02
+    assert found.place == pytest.approx(0.75)
+    assert abs(found.place - exact) <= found.uncertainty
+
+
+def test_points_without_a_multiplier_are_omitted() -> None:
+    points = [point(15.0, 1.05), point(15.2, None), point(15.4, 0.99)]
+    (found,) = measured_boundaries(points)
+    assert (found.low, found.high) == (15.0, 15.4)
+    assert boundaries([1.0], [0.9], [0.0]) == []
+
+
+def test_without_a_boundary_the_text_states_what_was_found() -> None:
+    curve = {
+        "omega_rad_s": np.array([15.0, 15.2]),
+        "amplitude_factor": np.array([1.01, 1.01]),
+        "fixed_modulus": np.array([1.05, 1.03]),
+        "table_modulus": np.array([np.nan, np.nan]),
+    }
+    texts = boundary_texts([point(15.0, 1.05), point(15.2, 1.03)], curve)
+    assert texts[0] == "no boundary was crossed: every measured orbit is unstable"
+    assert texts[1:] == ["predicted boundary on fixed ground: none in this range"]
+
+
+def test_the_sensitivity_to_the_amplitude_and_the_uncertainty_of_a_prediction() -> None:
+    """Against orbits computed anew; without uncertainty of the specimen, that of the modulus is zero."""
+    exact = SpecimenKnowledge(stiffness=0.0, damping=0.0, restitution=0.0, spring=0.0)
+    found = predicted(orbit(), exact, None, 1)
+    assert found.uncertainty == 0.0
+    assert found.table is None
+    assert found.multiplier == orbit().slowest
+    more, less = (rocking(Specimen().coupled(0.97), 15.0, by * AMPLITUDE) for by in (1.005, 0.995))
+    assert more is not None
+    assert less is not None
+    assert found.slope == pytest.approx((more.multiplier - less.multiplier) / 0.01, rel=0.02)
+    damping = exact.model_copy(update={"damping": 0.3})
+    assert 0.0 < predicted(orbit(), damping, None, 1).uncertainty < 0.1
+
+
+@pytest.mark.parametrize(("omega", "beta"), [(15.0, 0.97), (16.0, 0.4)])
+def test_the_deflection_excites_the_slowest_pair_only(omega: float, beta: float) -> None:
+    found = cycle_map(orbit(omega, beta), BenchConfiguration().simulated_shaker, 5)
+    controls = deflection(found, 60, 0.1)
+    assert controls.shape == (DEFLECTION,)
+    assert np.abs(controls).max() <= 0.1
+    x, (b1, b0), last = np.zeros(found.transition.shape[0]), found.inputs, np.zeros(2)
+    for control in (*controls, 0j):
+        now = np.array([control.real, control.imag])
+        x = found.transition @ x + b1 @ last + b0 @ now
+        last = now
+    multipliers, vectors = np.linalg.eig(found.transition)
+    shares = np.abs(np.linalg.inv(vectors) @ x) * np.linalg.norm(vectors, axis=0)
+    slow = np.isclose(np.abs(multipliers), abs(found.slowest))
+    assert slow.sum() == 2
+    assert shares[~slow].max() < 1e-6 * shares[slow].max()
+    deviation = np.linalg.norm(found.outputs @ x) / np.linalg.norm(found.orbit)
+    assert 0.005 < deviation < 0.15
+
+
+def test_several_frequencies_and_amplitudes_are_refused() -> None:
+    with pytest.raises(ValidationError, match="only at a single frequency"):
+        StabilityParameters(omega=(15.0, 15.2), amplitude_factor=(1.0, 1.1))
+
+
+def test_a_bench_whose_corrections_come_too_late_is_refused() -> None:
+    slow = BenchConfiguration(acquisition=Acquisition(block_duration=0.1, lead=0.4))
+    with pytest.raises(InvalidInput, match="are longer than a cycle"):
+        StabilityTest(StabilityParameters(), slow)
+
+
+def test_the_bisection_takes_the_middle_of_the_widest_bracket() -> None:
+    parameters = StabilityParameters(omega=(15.0, 15.2, 15.6, 16.0), bracket=0.01)
+    plan = StabilityPlan(parameters, BenchConfiguration(), {})
+    for each in (point(15.0, 1.05), point(15.2, 0.99), point(15.6, None), point(16.0, 1.01)):
+        plan.points.append(each)
+    assert plan.next_middle() == Place(15.6, 1.01)
+    plan.points.append(point(15.6, 1.0001))
+    assert plan.next_middle() == Place(pytest.approx(15.4), 1.01)
+    plan.points.extend((point(15.25, 1.001), point(15.1, 0.999)))
+    assert plan.next_middle() is None
+
+
+def test_a_design_exists_for_stable_orbits_too() -> None:
+    assert prepared(orbit(16.0, 0.4), None, 1) is not None

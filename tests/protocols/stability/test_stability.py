@@ -1,0 +1,86 @@
+"""Stability tests on the simulated bench, through engine, guard and sensors, in virtual time."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from bench.app.cli.main import main
+from bench.datafile.reader import open_datafile
+from protocols.common.sine.holding import HoldCycle
+
+pytestmark = pytest.mark.usefixtures("shared_results")
+
+QUICK = ["--harmonics", "5", "--starts", "2", "--measured-cycles", "12"]
+
+
+def points(folder: Path, *options: str) -> list[dict[str, Any]]:
+    command = ["run", "stability", "--yes", "--json", "--out", str(folder), *QUICK, *options]
+    assert main(command) == 0
+    return json.loads((folder / "summary.json").read_text(encoding="utf-8"))["points"]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("stability") / "run"
+
+
+@pytest.fixture(scope="module")
+def unstable(folder: Path) -> dict[str, Any]:
+    (found,) = points(folder, "--omega", "15", "--seed", "7", "--no-bisect")
+    return found
+
+
+def test_the_multiplier_of_an_unstable_orbit(unstable: dict[str, Any]) -> None:
+    assert unstable["status"] == "measured", unstable["reason"]
+    assert unstable["modulus"] > 1.0 + unstable["modulus_uncertainty"]
+    assert abs(unstable["modulus"] - unstable["modulus_predicted"]) <= max(0.003, unstable["modulus_uncertainty"])
+    assert unstable["angle_rad"] == pytest.approx(unstable["angle_predicted_rad"], abs=np.radians(0.5))
+    assert unstable["fixed_modulus"] == pytest.approx(1.0514, abs=2e-4)
+    assert unstable["agrees"] is True
+    assert abs(unstable["autocorrelation"]) < 0.4
+    parts = json.loads(unstable["uncertainty_parts"])
+    assert 2.0 * np.hypot(*parts.values()) == pytest.approx(unstable["modulus_uncertainty"], rel=1e-3)
+
+
+def test_the_deviation_grows_after_the_release_without_control(unstable: dict[str, Any], folder: Path) -> None:
+    with open_datafile(folder / "campaign.h5") as record:
+        cycles = record.columns_of(HoldCycle)
+    controls, deviations = np.array(cycles["control"]), np.array(cycles["deviation"])
+    free = int(np.flatnonzero(controls)[-1]) + 2
+    assert len(controls) - free >= unstable["released_cycles"]
+    assert deviations[-1] > 2.0 * deviations[free] > 0.0
+    assert controls[free - 2 - 8 : free - 2].max() <= 0.1
+
+
+def test_report_and_replay(
+    unstable: dict[str, Any], folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert (folder / "stability.png").stat().st_size > 10_000
+    assert main(["replay", str(folder / "campaign.h5")]) == 0
+    assert "Bit-identical to the file" in "".join(capsys.readouterr())
+    page = tmp_path / "report.html"
+    assert main(["report", str(folder / "campaign.h5"), "--html", str(page)]) == 0
+    text = page.read_text(encoding="utf-8")
+    assert "Stability of the rocking orbits" in text
+    assert f"{unstable['modulus']:.3f}" in text
+
+
+@pytest.mark.soak
+def test_the_boundary_is_bracketed(tmp_path: Path) -> None:
+    found = points(tmp_path / "run", "--omega", "15.2", "15.6", "--seed", "3")
+    assert sum(each["bisected"] for each in found) >= 3
+    unstable = max(each["omega_rad_s"] for each in found if each["modulus"] > 1.0)
+    stable = min(each["omega_rad_s"] for each in found if each["modulus"] < 1.0)
+    # of the table of 50 kg; on fixed ground 15.41 rad/s
+    assert unstable < stable <= unstable + 0.003 * stable
+    assert abs(0.5 * (unstable + stable) - 15.357) < 0.05
+
+
+@pytest.mark.soak
+def test_the_multiplier_over_amplitude(tmp_path: Path) -> None:
+    found = points(tmp_path / "run", "--omega", "15.3", "--amplitude-factor", "1.01", "1.1", "--no-bisect")
+    assert [each["status"] for each in found] == ["measured", "measured"]
+    assert all(abs(each["modulus"] - each["modulus_predicted"]) < 0.005 for each in found)
