@@ -1,0 +1,141 @@
+"""Multipliers and boundaries of drawn benches, against the exact ones of the drawn specimen on its table.
+
+    python -m tests.benchmarks.multipliers [--seeds 100] [--points 15:0.97 15.6:0.97 12.5:0.64] [--share 0.04]
+        [--boundary 15.2:15.6:0.97]
+
+Each run is `rockbench run stability` on the simulated bench, whose storeys and spring are off by up to `--share`
+(rectangular), its damping by 30 % and its restitution by 1 %; the scale of its accelerometer is off with a standard
+deviation of 0.5 %, as configured. The truth is computed with `sim.table_orbit` for the drawn specimen at the amplitude
+that its table really has. Printed for each run: errors of modulus and angle, absolute and in expanded uncertainties. In
+the end: the largest errors, and the shares covered. With `--boundary`, each run brackets the boundary between two
+frequencies; its truth is found by bisection.
+"""
+
+import argparse
+import contextlib
+import io
+import json
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bench.app.cli.main import main
+from bench.config.model import BenchConfiguration
+from protocols.stability.prediction import on_table, rocking
+from protocols.stability.protocol import StabilityPoint
+from protocols.stability.results import measured_boundaries
+from sim.specimen import Specimen
+from tests.benchmarks.hold import configured, drawn
+
+SCALE = 0.005
+"""Standard deviation of the relative error of the accelerometer's scale."""
+
+
+def measured(options: list[str], beta: float, seed: int, share: float) -> tuple[list[dict[str, Any]], Specimen, float]:
+    """Points of one run, the true specimen, and the error of the accelerometer's scale."""
+    specimen, factor = drawn(share, seed)
+    error = SCALE * float(np.random.default_rng(10_000 + seed).standard_normal())
+    with tempfile.TemporaryDirectory() as folder:
+        config = configured(specimen, factor, seed, Path(folder))
+        with config.open("a", encoding="utf-8") as file:
+            file.write(f"[simulation.bench.accelerometer]\nscale_error = {error!r}\n")
+        command = ["run", "stability", "--yes", "--json", "--config", str(config), "--out", f"{folder}/run"]
+        with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()) as told:
+            status = main([*command, "--beta", str(beta), *options])
+        if status != 0:
+            raise SystemExit(told.getvalue()[-800:])
+        points = json.loads(Path(f"{folder}/run/summary.json").read_text(encoding="utf-8"))["points"]
+    # a spring that is not the nominal one: beta of the true k_c over the true k1
+    true = specimen.coupled(beta * factor * BenchConfiguration().specimen.frame.k1 / specimen.frame.k1)
+    return points, true, error
+
+
+def truth(specimen: Specimen, omega: float, amplitude: float) -> complex:
+    """Multiplier of the specimen's orbit on the table."""
+    orbit = rocking(specimen, omega, amplitude)
+    found = None if orbit is None else on_table(orbit, BenchConfiguration().simulated_shaker, 10)
+    return complex("nan") if found is None else found
+
+
+def of_points(asked: argparse.Namespace) -> None:
+    for text in asked.points:
+        omega, beta = map(float, text.split(":"))
+        errors = list[tuple[float, float, float, float]]()
+        failed = 0
+        for seed in range(asked.first, asked.first + asked.seeds):
+            options = ["--omega", str(omega), "--no-bisect", *asked.options]
+            (point,), specimen, error = measured(options, beta, seed, asked.share)
+            if point["modulus"] is None:
+                failed += 1
+                print(f"{text} seed {seed}: {point['status']}: {point['reason']}", flush=True)
+                continue
+            exact = truth(specimen, omega, point["amplitude_m_s2"] / (1.0 + error))
+            modulus, angle = point["modulus"] - abs(exact), point["angle_rad"] - abs(np.angle(exact))
+            errors.append(
+                (modulus, modulus / point["modulus_uncertainty"], angle, angle / point["angle_uncertainty_rad"])
+            )
+            print(
+                f"{text} seed {seed}: |mu| {abs(exact):.4f} {modulus:+.5f} ({errors[-1][1]:+.2f} U), angle "
+                f"{np.degrees(angle):+.3f} deg ({errors[-1][3]:+.2f} U), {point['released_cycles']} cycles, "
+                f"{point['pairs']} pairs, autocorrelation {point['autocorrelation']:+.2f}",
+                flush=True,
+            )
+        each = np.abs(np.array(errors).reshape(-1, 4))
+        if len(each):
+            print(
+                f"{text}: measured {len(each)} of {asked.seeds}; |mu| within 0.005 {np.mean(each[:, 0] <= 0.005):.0%}, "
+                f"within U {np.mean(each[:, 1] <= 1.0):.0%}, rms {np.sqrt(np.mean(each[:, 0] ** 2)):.5f}; angle within "
+                f"1 deg {np.mean(each[:, 2] <= np.radians(1.0)):.0%}, within U {np.mean(each[:, 3] <= 1.0):.0%}; "
+                f"not measured {failed}",
+                flush=True,
+            )
+
+
+def of_boundaries(asked: argparse.Namespace) -> None:
+    low, high, beta = map(float, asked.boundary.split(":"))
+    inside, close, found = 0, 0, 0
+    for seed in range(asked.first, asked.first + asked.seeds):
+        options = ["--omega", str(low), str(high), *asked.options]
+        rows, specimen, error = measured(options, beta, seed, asked.share)
+        points = [StabilityPoint.model_validate(row) for row in rows]
+        boundary = next(iter(measured_boundaries(points)), None)
+        if boundary is None:
+            print(f"boundary, seed {seed}: none between the frequencies", flush=True)
+            continue
+        amplitude = next(point.amplitude_m_s2 or 0.0 for point in points if point.amplitude_m_s2) / (1.0 + error)
+        below, above = boundary.low - 0.1, boundary.high + 0.1
+        falling = abs(truth(specimen, below, amplitude)) > 1.0
+        while above - below > 1e-3:
+            middle = 0.5 * (below + above)
+            if (abs(truth(specimen, middle, amplitude)) > 1.0) is falling:
+                below = middle
+            else:
+                above = middle
+        off = boundary.place - 0.5 * (below + above)
+        found, inside, close = found + 1, inside + (abs(off) <= boundary.uncertainty), close + (abs(off) <= 0.05)
+        print(
+            f"boundary, seed {seed}: {boundary.place:.4f} rad/s, {off:+.4f} ({off / boundary.uncertainty:+.2f} U), "
+            f"{len(points)} points",
+            flush=True,
+        )
+    print(f"boundary: {found} of {asked.seeds}; within U {inside}, within 0.05 rad/s {close}", flush=True)
+
+
+def study() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seeds", type=int, default=100)
+    parser.add_argument("--first", type=int, default=1)
+    parser.add_argument("--share", type=float, default=0.04)
+    parser.add_argument("--points", nargs="*", default=["15:0.97", "15.6:0.97", "12.5:0.64"])
+    parser.add_argument("--boundary", default="")
+    parser.add_argument("--options", nargs="*", default=["--starts", "3"])
+    asked = parser.parse_args()
+    of_points(asked)
+    if asked.boundary:
+        of_boundaries(asked)
+
+
+if __name__ == "__main__":
+    study()
