@@ -26,8 +26,8 @@ _IDLE_TURN = 0.02
 class EmulatedBench:
     """A `Plant` around the virtual bench, advanced by every read, and by a separate thread in between.
 
-    One tick is one sample of the virtual bench; `clock_error` is the relative error of the tick rate, in addition to that
-    of the bench's own sample clock.
+    One tick is one sample of the virtual bench; `clock_error` is the relative error of the tick rate, in addition to
+    that of the bench's own sample clock.
     """
 
     def __init__(

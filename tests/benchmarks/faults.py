@@ -6,7 +6,8 @@ reacts.
     python -m tests.benchmarks.faults --only laser        faults whose name contains a text
     python -m tests.benchmarks.faults --trips 1000        1000 reactions of the profile fast at random phases, on the
                                                           virtual bench; --bench emulated: in real time on the device,
-                                                          --networked: with the profile for gRPC servers
+                                                          called without a network; --networked: through gRPC, with
+                                                          the profile for it
     python -m tests.benchmarks.faults --reaction          the table of reaction times only
 
 Prints, for every fault and for every state of the engine, at how many places it was put in, how often it struck, how
@@ -125,10 +126,12 @@ def trips(count: int, bench: str, *, networked: bool) -> bool:
     if bench == "emulated":
         from tests.faults.emulated.reaction import reactions_in_real_time
 
-        tried = list(reactions_in_real_time(block, lead, phases))
+        tried = list(reactions_in_real_time(block, lead, phases, local=not networked))
         found = [one for one in tried if isinstance(one, Reaction)]
         void = [one for one in tried if not isinstance(one, Reaction)]
-        print(f"{len(void)} trips ended earlier, because the machine was too late for real time: {void[:1]}")
+        print(f"{len(void)} of {count} runs ended earlier, because the machine was too late for real time")
+        for told, number in Counter(f"{type(one).__name__}: {one}" for one in void).items():
+            print(f"{number:5d} {told}")
         if not found:
             return False
     else:

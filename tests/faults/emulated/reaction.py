@@ -1,7 +1,7 @@
 """How fast the guard reacts through the real drivers, in real time: told by the emulated bench, not by the program."""
 
 from collections.abc import Iterator, Sequence
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from typing import Any
 
 import numpy as np
@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 from bench.guard.guard import Guard
 from bench.guard.limits import Ramps
 from drivers.emulation.laboratory import Laboratory
-from drivers.errors import RigError
+from drivers.errors import DeviceTimeout, DriveUnderflow, RigError
 from drivers.hardware.rig import HardwareRig
 from sim.specimen import Specimen
 from sim.virtual_bench import VirtualBenchParameters
+from tests.faults.emulated.local import without_network
 from tests.faults.emulated.witness import Witness
 from tests.faults.reaction import LIMITS, OMEGA, RATE, VOLTS, Reaction
 
@@ -28,17 +29,23 @@ def react_in_real_time(block: int, lead: int, phase: float) -> Reaction:
     return reaction
 
 
-def reactions_in_real_time(block: int, lead: int, phases: Sequence[float]) -> Iterator[Reaction | RigError]:
-    """One after the other on one bench; an error where the machine was too late for real time."""
-    with Laboratory(VirtualBenchParameters(sample_rate=RATE), Specimen(), seed=1, connection="analogue") as laboratory:
-        witness = Witness(laboratory.bench)
-        with HardwareRig(laboratory.hardware, lead=lead) as rig:
-            for phase in phases:
-                try:
-                    yield _reaction(rig, witness, laboratory, block, lead, phase)
-                except RigError as error:
-                    rig.stop()
-                    yield error
+def reactions_in_real_time(
+    block: int, lead: int, phases: Sequence[float], *, local: bool = False
+) -> Iterator[Reaction | RigError]:
+    """One after the other, each on a bench of its own, whose table and over-travel switches are at rest; an error where
+    the machine was too late for real time. `local`: the device is called without a network, as on this computer."""
+    parameters = VirtualBenchParameters(sample_rate=RATE)
+    for phase in phases:
+        with Laboratory(parameters, Specimen(), seed=1, connection="analogue") as laboratory, ExitStack() as opened:
+            witness = Witness(laboratory.bench)
+            if local:
+                opened.enter_context(without_network(laboratory.daq))
+            rig = opened.enter_context(HardwareRig(laboratory.hardware, lead=lead))
+            try:
+                found = _reaction(rig, witness, laboratory, block, lead, phase)
+            except (DriveUnderflow, DeviceTimeout) as error:
+                found = error
+        yield found
 
 
 def _reaction(
