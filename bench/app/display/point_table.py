@@ -14,6 +14,8 @@ from bench.document.typography import first_words, without_unit
 
 NO_LABELS: Mapping[str, str] = {}
 _UNCERTAINTY, _PREDICTED = "_uncertainty", ("_predicted", "_nominal")
+MOST_NAMED = 2
+"""Largest number of disagreeing results that are named in the verdict of a run."""
 _GOOD = ("", "steady", "held", "measured", "resting")
 """States of a point that are not displayed next to its verdict."""
 
@@ -96,6 +98,23 @@ def rows_of(
         numbers = [name for name, column in results.items() if column.unit and not name.endswith("uncertainty")]
         found = [name for name in numbers[1:] if any(isinstance(point[name], float) for point in points)] or numbers
     return [row for point in points for row in _rows(point, found, stems, named, results, labels)]
+
+
+def summary_of(rows: Sequence[Measured]) -> str:
+    """Verdict of a run in one sentence: its only compared result, or how many agree and which do not. Empty without a
+    comparison.
+    """
+    judged = [row for row in rows if row.agrees is not None]
+    if not judged:
+        return ""
+    if len(judged) == 1:
+        return judged[0].sentence
+    off = [f"{row.quantity} {texts.AT} {row.point}" for row in judged if not row.agrees]
+    agree = texts.AGREEING.format(agree=len(judged) - len(off), judged=len(judged))
+    if not off:
+        return agree
+    more = texts.AND_MORE.format(n=len(off) - MOST_NAMED) if len(off) > MOST_NAMED else ""
+    return f"{agree} · {texts.DISAGREES}: {'; '.join(off[:MOST_NAMED])}{more}"
 
 
 def every_field(

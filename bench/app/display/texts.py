@@ -178,6 +178,7 @@ POINT_TIPS = (
 )
 INTERVAL = "{value} ({low:.3g} to {high:.3g})"
 AGREES, DISAGREES = "✓ agrees", "▲ DISAGREES"
+AGREEING, AT, AND_MORE = "{agree} of {judged} compared results agree with the prediction", "at", "; {n} more"
 YES, NO = "yes", "no"
 EVERYTHING, EVERYTHING_TIP = "All fields", "Shows every field of every point, with its unit (Ctrl+Shift+F)."
 COMPARISON_TIP = "Tick two or more files to compare their points with those of the first."

@@ -7,8 +7,8 @@ from PySide6.QtWidgets import QApplication
 from bench.app.display.theme import DARK, LIGHT, Theme
 
 BASE, SMALL, VALUE, BANNER = 11, 14, 20, 26
-"""Font sizes [pt] of text, of STOP in a small window, of live values, and of the bench's state, which is readable at
-two metres.
+"""Font sizes [pt] of text, of a verdict and of STOP in a small window, of live values, and of the bench's state, which
+is readable at two metres.
 """
 
 
@@ -46,6 +46,7 @@ def style_sheet(theme: Theme) -> str:
     QTabWidget#motion QTabBar::tab {{ min-height: 24px; min-width: 40px; padding: 0px 6px; }}
     QLabel[role="word"] {{ font-size: {BANNER}pt; font-weight: bold; }}
     QLabel[role="value"] {{ font-size: {VALUE}pt; font-weight: bold; }}
+    QLabel[role="verdict"] {{ font-size: {SMALL}pt; font-weight: bold; }}
     QLabel[role="faint"] {{ color: {theme.faint}; }}
     QLabel[level="calm"] {{ color: {theme.calm}; }}
     QLabel[level="good"] {{ color: {theme.good}; }}

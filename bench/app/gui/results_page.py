@@ -23,7 +23,7 @@ from PySide6.QtWidgets import (
 
 from bench.app.display import texts
 from bench.app.display.gains import Difference, compare, kind_of
-from bench.app.display.point_table import every_field, rows_of
+from bench.app.display.point_table import every_field, rows_of, summary_of
 from bench.app.display.theme import Theme
 from bench.app.display.typography import typeset
 from bench.app.formatting import ABSENT, number
@@ -33,7 +33,7 @@ from bench.app.gui.gain_plot import GainPlot
 from bench.app.gui.history_view import HistoryView
 from bench.app.gui.open_files import FileList, Place, read_file
 from bench.app.gui.outputs import Outputs
-from bench.app.gui.widgets import FITTING, ask_for_files, give_key, scrolling, set_level, why_no_dialog
+from bench.app.gui.widgets import FITTING, ElidingLabel, ask_for_files, give_key, scrolling, set_level, why_no_dialog
 from bench.app.ipc.messages import Ended, Refused
 from bench.datafile.tables import Column
 from bench.results import FILE
@@ -114,6 +114,11 @@ class ResultsPage(QWidget):
         super().__init__()
         self._controller = controller
         self.message, self.files = QLabel(texts.RESULTS_EMPTY, wordWrap=True), FileList()
+        # one line: the table below names every point
+        self.verdict = ElidingLabel()
+        self.verdict.setProperty("role", "verdict")
+        self.verdict.setAccessibleName(texts.NAMES["alpha"])
+        self.verdict.hide()
         self.message.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self.open_file, self.remove = QPushButton(texts.OPEN), QPushButton(texts.REMOVE)
         give_key(self.open_file, "Ctrl+O")
@@ -198,6 +203,9 @@ class ResultsPage(QWidget):
         points = [] if file is None else file.points
         labels: Mapping[str, str] = {} if file is None else file.labels
         show_points(self.table, results, points, labels, everything=self.everything.isChecked())
+        verdict = summary_of(rows_of(results, points, labels))
+        self.verdict.setText(verdict)
+        self.verdict.setVisible(bool(verdict))
 
     def _draw(self) -> None:
         """Draw the gains of all ticked files, with the predicted lines of the first."""
@@ -267,6 +275,7 @@ class ResultsPage(QWidget):
         content = QWidget()
         rows = QVBoxLayout(content)
         rows.setContentsMargins(0, 0, 0, 0)
+        rows.addWidget(self.verdict)
         rows.addWidget(self.message)
         rows.addWidget(whole, 1)
         rows.addWidget(self.outputs)

@@ -132,6 +132,20 @@ def test_every_point_has_its_verdict_in_six_columns(page: ResultsPage, tmp_path:
     assert any("laser scale 0.001; clock 0.0005" in text for text in shown)
 
 
+def test_the_verdict_of_the_run_is_above_its_points(page: ResultsPage, tmp_path: Path) -> None:
+    told = {"alpha_2_predicted": 0.199, "alpha_2_predicted_uncertainty": 0.002, "agrees": True}
+    good = _point(16.0, 0.2).model_copy(update=told)
+    off = _point(17.0, 0.3).model_copy(update={**told, "agrees": False})
+    page.show_file(_made(tmp_path / "one", good))
+    assert page.verdict.text().startswith("α₂ 0.2000 ± 0.0040 · predicted 0.1990 ± 0.0020")
+    assert "✓ agrees" in page.verdict.text()
+    page.show_file(_made(tmp_path / "two", good, off, _point(18.0, None)))
+    expected = "1 of 2 compared results agree with the prediction · ▲ DISAGREES: α₂ at ω = 17 rad/s, β = 0.4"
+    assert page.verdict.text() == expected
+    page.show_file(_made(tmp_path / "none", _point(18.0, None)))
+    assert page.verdict.isHidden()
+
+
 def test_a_file_has_the_figures_of_its_folder(page: ResultsPage, tmp_path: Path) -> None:
     path = _made(tmp_path / "thursday", _point(16.0, 0.2))
     image = QImage(200, 100, QImage.Format.Format_RGB32)
