@@ -36,8 +36,8 @@ HISTORY_HEADROOM = 1.1
 
 @dataclass(frozen=True, eq=False)
 class MotionPicture:
-    """Acceleration of the table [m/s2] under a record, at intervals of `dt` [s]: as requested, and as achieved with the
-    bare frame.
+    """Acceleration of the table [m/s2] under a record, at intervals of `dt` [s]: `asked`, as requested, and `achieved`
+    with the bare frame.
     """
 
     name: str
@@ -102,7 +102,7 @@ def motion_figure(motions: Sequence[MotionPicture]) -> "Figure":
 
 
 def drift_figure(drifts: Sequence[DriftPicture]) -> "Figure":
-    """Drifts, one row per record: bare frame, and frame with the softest measured spring."""
+    """Drifts, one row per record: bare frame, and frame with the softest spring for which there is a history."""
     names = list(dict.fromkeys(drift.name for drift in drifts))
     figure, panels = _rows(len(names))
     for panel, name in zip(panels, names, strict=False):

@@ -52,7 +52,7 @@ SYMBOLS = {"alpha_1": r"$\alpha_1$", "alpha_2": r"$\alpha_2$"}
 
 @dataclass(frozen=True, eq=False)
 class BranchGrid:
-    """Branch of steady motions over the grid of n stiffnesses by m frequencies; NaN where the motion does not exist.
+    """Branch of steady motions on the grid of n stiffnesses by m frequencies; NaN where the motion does not exist.
 
     gains : alpha_1 and alpha_2 by name, each of shape (n, m).
     multiplier : greatest |Floquet multiplier|, shape (n, m).

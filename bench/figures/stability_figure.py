@@ -1,5 +1,5 @@
 # pyright: reportUnknownMemberType=false
-"""Slowest multiplier against frequency, on fixed ground and on the table; one panel per stiffness."""
+"""Modulus of the slowest multiplier against frequency, on fixed ground and on the table; one panel per stiffness."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any

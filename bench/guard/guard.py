@@ -78,7 +78,7 @@ class Guard:
         self._sending = False
         self._owed = self._zeros = 0
         """`_owed`: number of samples that may be queued in the rig in addition to those in `_waiting`. `_zeros`: number
-        of samples read since the ramp ended with only zeros in `_waiting`.
+        of samples read since the ramp ended and `_waiting` contained only zeros.
         """
         self._make_watches()
         self._ramp_samples: int | None = None

@@ -17,7 +17,9 @@ TIMING = (LATE, CLOCKS)
 device, not on the motion.
 """
 _DRIVEN = 0.05
-"""Drive change, relative to the largest command, above which the table counts as driven and all counts must change."""
+"""Drive change, relative to the drive voltage limit, above which the table is considered driven, so that all counts
+must change.
+"""
 
 
 class SensorWatch:

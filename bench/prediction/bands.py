@@ -18,7 +18,7 @@ from sim.steady import NoOrbit, Orbit
 from sim.sweep import Done
 
 INTERVAL = (0.025, 0.975)
-"""Percentiles that enclose 95 % of the members of a Monte Carlo simulation."""
+"""Quantiles that enclose 95 % of the members of a Monte Carlo simulation."""
 
 SEED = 20260101
 """Seed of the members: the same for every point, so that a band is as smooth as its curve."""
@@ -51,7 +51,7 @@ def bands(
     """Band around each `alpha_2`, shape (n,), of the motions `orbits`.
 
     With `members` > 0, the band is from a Monte Carlo simulation with that number of draws. Otherwise it is to first
-    order: the gain is computed one standard uncertainty to either side along each independent direction (GUM 5.1.4,
+    order: the gain is computed at one standard uncertainty on both sides along each independent direction (GUM 5.1.4,
     note 2), and the band is symmetric. Where the motion exists on only one side, the result of that side is used for
     both.
     """
@@ -60,7 +60,7 @@ def bands(
     for orbit in orbits:
         if orbit.specimen not in of:
             of[orbit.specimen] = _members(orbit.specimen, known, members)
-    # pad to equal numbers of members: a quantity may be exact for one spring and uncertain for another
+    # pad with the specimen itself: the numbers differ where a quantity is exact for one spring, uncertain for another
     most = max(map(len, of.values()), default=0)
     own = [of[orbit.specimen] + [orbit.specimen] * (most - len(of[orbit.specimen])) for orbit in orbits]
     gains = steady_gains(orbits, own, done=done, scheduler=scheduler)[:, :, 1]

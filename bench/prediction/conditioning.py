@@ -38,7 +38,7 @@ class Condition:
     end_time_error: float
 
     def rounded_end(self, end_time: float) -> float:
-        """`end_time` [s] without the digits that its error makes false."""
+        """`end_time` [s] rounded to the digits that its error leaves valid."""
         if not 0.0 < self.end_time_error < 1.0:
             return end_time
         return round(end_time, floor(-log10(self.end_time_error)))

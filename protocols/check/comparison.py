@@ -79,7 +79,7 @@ def table_delay_lines(
     """Delay of the accelerometer against the table's displacement sensor, and of each laser on the ground against the
     accelerometer, at most `most` [s]. Together with `delay_lines`, every pair of channels is compared.
 
-    An acceleration that follows each step of the held output lags by half a sample.
+    The limits include half a sample, by which an acceleration that follows each step of the held output lags.
     """
     if parameters.delay_tolerance is None:
         return

@@ -142,7 +142,7 @@ def dead_time(
     magnitude = np.abs(wanted)
     basis = np.column_stack((s**0, 1.0 / s, 1.0 / s**2)) / magnitude[:, None]
     tried = np.arange(-2.0 * longest, 2.0 * longest, _FINEST)
-    # exp(s T) only rotates a row: turned back on the right side, it leaves one matrix for all T
+    # exp(s T) only rotates each row: the right-hand side is rotated back, so that one matrix serves all T
     turned = (wanted / magnitude)[:, None] * np.exp(-s[:, None] * tried)
     rows, aims = np.concatenate((basis.real, basis.imag)), np.concatenate((turned.real, turned.imag))
     solutions, *_ = np.linalg.lstsq(rows, aims, rcond=None)

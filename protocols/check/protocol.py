@@ -31,7 +31,9 @@ class CheckParameters(Parameters):
     acceleration_noise: float = quantity(
         0.02, "m/s2", "largest standard deviation of the table's acceleration at rest", gt=0
     )
-    scale_tolerance: float = quantity(0.02, "1", "largest relative difference between two sensors", gt=0, lt=0.5)
+    scale_tolerance: float = quantity(
+        0.02, "1", "largest relative difference between the scales of two sensors", gt=0, lt=0.5
+    )
     drive_tolerance: float = quantity(
         0.25, "1", "largest relative difference between measured and expected drive", gt=0, lt=1
     )
@@ -39,8 +41,8 @@ class CheckParameters(Parameters):
     delay_tolerance: float | None = quantity(
         2e-4,
         "s",
-        "largest difference between the delays of the table's two sensors, excluding the hold of the output; "
-        "if absent, they are not compared",
+        "largest difference between the delays of the table's two sensors; the accelerometer may lag by half a sample "
+        "more, since the output is held between samples; if absent, they are not compared",
         gt=0,
         le=0.1,
     )
@@ -81,10 +83,11 @@ def number(value: float | None, digits: int = 4) -> str:
 
 PROTOCOL = Protocol(
     name="check",
-    summary="Check the loop of the configured bench at low level, and give a remedy for each line that fails.",
+    summary="Check the loop of the configured bench at low level, and give a remedy for each check that fails.",
     details=(
         "Records every channel at rest, then drives sines of equal velocity with the frame locked to the "
-        "table, and checks polarity, scale and delay of all sensors, and the drive. The exit code is 1 if a line fails."
+        "table, and checks polarity, scale and delay of all sensors, and the drive. The exit code is 1 if a check "
+        "fails."
     ),
     example="--config bench.toml",
     parameters=CheckParameters,

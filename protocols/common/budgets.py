@@ -46,8 +46,8 @@ def budgeted(
     expanded: float | None = None,
     correlations: str | None = None,
 ) -> list[Budgeted]:
-    """A result whose contributions are `parts`, as JSON; empty if the file has no budget for it. The expanded
-    uncertainty is by default that of the parts.
+    """A result whose contributions are `parts`, as JSON; empty if the file has no budget for it. By default,
+    the expanded uncertainty is computed from the parts.
     """
     if not value or not parts:
         return []

@@ -25,7 +25,7 @@ from sim.sweep import in_threads
 Array = NDArray[np.float64]
 
 CHUNK = 10
-"""Number of successive draws that one thread computes with the same memory."""
+"""Number of successive draws that a thread computes with the same work arrays."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ def predict_draws(
 
 
 class _Runs:
-    """Simulated runs of both tests; their memory may be used by one thread only."""
+    """Simulated runs of both tests; their work arrays may be used by one thread only."""
 
     def __init__(self, bare: BaseMotion, coupled: BaseMotion) -> None:
         self._coupled = RecordRuns(coupled.acceleration.size, coupled.dt)

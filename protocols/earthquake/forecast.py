@@ -99,7 +99,7 @@ DRAWS, SEED = 32, 8
 """Number of specimens drawn in addition to the nominal one, and random seed."""
 
 OFF = 0.03
-"""Relative error of the table's motion, and allowance for noise and friction in all quantities."""
+"""Relative error of the table's motion, and allowance for noise and friction in the demands on table and shaker."""
 
 IMPACTS = 0.15
 """Allowance for quantities increased by the impacts of a rocking block, which the drive does not compensate."""
@@ -147,7 +147,7 @@ def combinations(
 def beyond_limits(found: Sequence[Combination], configuration: BenchConfiguration) -> LeftOut:
     """Combinations that exceed the limits even with the nominal specimen, with the reason. If a record exceeds them
     with the bare frame, it is omitted with all springs; if it exceeds them with all springs, it is omitted with the
-    bare frame. Empty if no combination would remain, so that the limits refuse the campaign.
+    bare frame. Empty if no combination would remain: the preflight then refuses the campaign.
     """
     bound = bounds(configuration)
     left = LeftOut()

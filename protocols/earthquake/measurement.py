@@ -50,7 +50,7 @@ class Observed:
 
 def observe(signals: Array, rest: int, sample_rate: float) -> Observed:
     """Evaluate the signals of a complete record, shape (n, len(SIGNALS)), whose first `rest` samples are at rest.
-    Raises InvalidInput.
+    Raises InvalidInput for signals without a measurable motion or peak.
     """
     still = signals[: round(QUIET * rest)]
     return Observed(
@@ -185,7 +185,7 @@ class History:
         return History(samples[:, 1] - samples[:, 0])
 
     def padded(self, size: int) -> Array:
-        """Drift [m], padded with NaN to shape (size,)."""
+        """Drift [m], cut off or padded with NaN to shape (size,)."""
         return np.append(self.drift[:size], np.full(max(size - self.drift.size, 0), np.nan))
 
 

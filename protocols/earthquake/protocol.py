@@ -43,7 +43,7 @@ class EarthquakeParameters(Parameters):
         le=1,
     )
     trim: float = quantity(
-        0.0005, "1", "fraction of the Arias intensity removed at either end of a record; 0: none", ge=0, lt=0.1
+        0.0005, "1", "fraction of the Arias intensity removed at each end of a record; 0: none", ge=0, lt=0.1
     )
     longest: float = quantity(
         100.0,
@@ -149,7 +149,10 @@ class EarthquakePoint(Parameters):
         None, "s", "time at which the block finally passed its critical angle, to about 0.3 s"
     )
     overturned_predicted_s: float | None = quantity(
-        None, "s", "median of the predicted times at which the block reaches 0.35 rad, about 0.45 s later"
+        None,
+        "s",
+        "median of the predicted times at which the block reaches 0.35 rad, about 0.45 s after it passes its critical "
+        "angle",
     )
     drift_peak_m: float | None = quantity(None, "m", "peak drift of the coupled frame")
     bare_drift_peak_m: float | None = quantity(None, "m", "peak drift of the bare frame")

@@ -217,7 +217,7 @@ def shakings(
     parameters: EarthquakeParameters, configuration: BenchConfiguration, sources: FileSources | None = None
 ) -> tuple[Shaking, ...]:
     """Read and prepare every record, in the given order, or take them from `sources`, those stored in a data file.
-    Raises InvalidInput.
+    Raises InvalidInput for a record that cannot be read or is unsuitable for the bench.
     """
     named = parameters.records or tuple(f"synthetic:{name}" for name in NAMES)
     records = sources.records if sources else read_records([RecordReference.parse(text) for text in named])

@@ -1,9 +1,9 @@
 """Comparison of measured and predicted gain by Monte Carlo simulation under the achieved motions of the table.
 
 The bare and the coupled test share sensors and specimen, so each draw has one specimen, one scale of the table's
-sensors and one pair of lasers for both; noise is drawn separately. If the model holds, the product of two draws, the
-measurement's ratio of coupled to bare and the predicted gain relative to its nominal value, is distributed as the
-measured gain (GUM Supplement 1).
+sensors and one pair of lasers for both; noise is drawn separately. If the model holds, the measured gain is
+distributed as the product of the drawn predicted gain and the drawn error of the measured ratio of coupled to bare, as
+a factor (GUM Supplement 1).
 
 A second set of draws, with an exactly known specimen, gives the uncertainty due to the bench alone. Contributions drawn
 one by one only show which one is the largest: where the response is chaotic, each one changes the gain as much as all

@@ -178,7 +178,7 @@ def _impacts(tilt: Tilt, alone: Findings, number: int) -> FitFinished:
         "angle_before": Series(relation.angles[:-1], "rad", "largest angle before the impact"),
         "angle_after": Series(relation.angles[1:], "rad", "largest angle after the impact"),
         "time_uncertainty": Series(
-            points.impact_uncertainty[1 : count + 1], "s", "standard uncertainty of the angle from noise"
+            points.impact_uncertainty[1 : count + 1], "s", "standard uncertainty of the time from noise"
         ),
     }
     text = f"impacts of tilt {number}: r = {relation.restitution:.5f} +- {alone.relation.uncertainty:.1g} (k = 1)"

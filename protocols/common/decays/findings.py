@@ -99,7 +99,7 @@ def impossible_values(result: FrameResult) -> str | None:
     """Warning that names physically impossible values, which are not stored; None if all values are possible."""
     values = {name: float(result.frame.values[place]) for name, place in FOUND.items()}
     texts = [f"{name} = {value:.3g}" for name, value in values.items() if not possible(name, value)]
-    return f"{', '.join(texts)} is physically impossible, and is not stored for other runs" if texts else None
+    return f"physically impossible, and not stored for other runs: {', '.join(texts)}" if texts else None
 
 
 def through_masses(shift: Array, known: Identified, name: str) -> float:

@@ -32,7 +32,7 @@ QUIET = 2.0
 """Time at rest in the recording before the pulse [s], from which the noise of the table's sensor is determined."""
 
 LEFT, LONGEST = 1.0 / 12.0, 60.0
-"""Fraction of the first mode that remains at the end of the window, and longest automatic window [s]."""
+"""Fraction of the first mode's amplitude that remains at the end of the window, and longest automatic window [s]."""
 
 LEAST = 0.003
 """Minimum drift of a decay [m]; the resolution of the lasers dominates below it."""

@@ -114,7 +114,7 @@ def find_level(
             continue
         room, binds = _headroom(signals, pulse.sample_rate, configuration)
         if limit / volts < room:
-            room, binds = limit / volts, "limits of the drive"
+            room, binds = limit / volts, "the drive limit"
         left = min(drift / seen, room)
         if left < NEAR:
             return (yield from _accept(left * volts, left * seen, drift, binds))
@@ -140,7 +140,7 @@ def _accept(volts: float, seen: float, drift: float, binds: str) -> Generator[St
 
 def _headroom(signals: Array, sample_rate: float, configuration: BenchConfiguration) -> tuple[float, str]:
     """Factor by which a motion may be scaled until it reaches `SHARE` of a limit, and the name of that limit."""
-    # average over a few milliseconds: differences of single samples are dominated by noise
+    # average over 20 ms: differences of single samples are dominated by noise
     many = max(round(0.02 * sample_rate), 1)
     rows = len(signals) // many
     smooth = signals[: rows * many, DISPLACEMENT].reshape(rows, many).mean(axis=1)

@@ -110,7 +110,7 @@ AUDIBLE = 2.0
 """Minimum ratio of the response to its noise."""
 
 _AUDIBLE_BY = 2
-"""Number of the probe at which, at the latest, the table must respond."""
+"""Number of probes within which the table must respond."""
 
 _MOST = 6
 """Largest number of probes."""
@@ -147,8 +147,8 @@ def probed_response(motion: Complex, grid: Grid, rules: Rules) -> Generator[Step
             return response
         drive = drive_for(motion, response, short, rules.knee) * min(1.0, GROWTH * reached / level)
     raise Unmeasurable(
-        f"after {_MOST} probes the acceleration of the table is {reached:.2g} m/s2, but {level:.2g} are "
-        "required: check the amplifier's gain and the guides of the table"
+        f"after {_MOST} probes the acceleration of the table is {reached:.2g} m/s2, but {level:.2g} m/s2 "
+        "is required: check the amplifier's gain and the guides of the table"
     )
 
 
@@ -157,9 +157,11 @@ def _acceleration(outcome: Played) -> NDArray[np.float64]:
 
 
 def _answer(moved: Complex) -> tuple[float, float]:
-    """Root sum of squares of the mean over the periods, and of its noise, estimated from the scatter of the periods.
+    """Response and its noise [m/s2], from the amplitudes `moved`, shape (periods, n_lines).
 
-    Without a response, both are equal except for their scatter, which decreases with the number of lines.
+    The response is the root sum of squares, over the lines, of the mean amplitudes of the periods; the noise is that of
+    the standard errors of these means, estimated from the scatter between periods. If the table does not respond, the
+    two are equal but for a random difference, which decreases with the number of lines.
     """
     periods, mean = moved.shape[0], moved.mean(axis=0)
     noise = np.sum(np.abs(moved - mean) ** 2) / (periods * (periods - 1))
@@ -249,7 +251,8 @@ def _warned(outcome: Played, specimen: Specimen, configuration: BenchConfigurati
     moved = outcome.signals[:, ACCELERATION]
     share = resting_demands(moved, configuration.sample_rate, specimen, configuration).get(RESTING, 0.0)
     if share > 1.0:
-        yield Publish(Warned(f"the block may have lifted: the moment reached {share:.2f} of the moment of its weight"))
+        text = f"the block may have lifted: the overturning moment reached {share:.2f} times that of its weight"
+        yield Publish(Warned(text))
 
 
 def _identified(

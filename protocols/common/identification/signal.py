@@ -67,7 +67,7 @@ class Grid:
         return np.concatenate((rise * one[self.samples - n :], whole, rise[::-1] * one[:n]))
 
     def used(self, record: Array) -> Array:
-        """Steady-state periods of a signal recorded while `record` was played, shape (periods, samples).
+        """Steady-state periods of `record`, a signal measured while the drive was played, shape (periods, samples).
 
         Raises InvalidInput for missing samples.
         """

@@ -56,7 +56,7 @@ fade.
 
 @event(table="hold_cycles", journalled=False)
 class HoldCycle(Event):
-    """One cycle of an unstable motion that a stabiliser holds; values are NaN if the cycle could not be measured."""
+    """One cycle of an unstable motion while it is held or after its release; values are NaN for an unmeasured cycle."""
 
     omega: float = column("rad/s", "circular frequency of the base motion")
     beta: float | None = column("1", "stiffness ratio of the coupling spring")
