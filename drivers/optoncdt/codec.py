@@ -6,8 +6,9 @@ L-byte  0 0 D5  D4  D3  D2  D1  D0
 M-byte  0 1 D11 D10 D9  D8  D7  D6
 H-byte  1 F D17 D16 D15 D14 D13 D12     F = 0: first value of a measurement
 
-A distance is stored as counts from mid range, n = code - `MID_RANGE`, so that the value from mid range is
-n * `count_size`. The eight 16-bit integers below -`MID_RANGE` are fault marks of samples without a distance.
+A distance is stored as counts from mid range, n = code - `MID_RANGE`, so that the distance from mid range is
+n * `count_size`. The eight 16-bit integers below -`MID_RANGE`, and the two largest ones, are fault marks of samples
+without a distance.
 """
 
 from collections.abc import Mapping

@@ -93,7 +93,7 @@ class CommandRefused(RigError):
 
 
 class Dialogue:
-    """Command dialogue with a sensor on `port`, whose read time-out is about 10 ms. `who` names sensor and port in
+    """Command dialogue with a sensor on `port`, whose read time-out is about 20 ms. `who` names sensor and port in
     errors.
 
     Every method raises ConnectionLost if the port has disappeared.
@@ -162,7 +162,7 @@ class Dialogue:
         return ConnectionLost(f"{self.who} was disconnected ({error}); plug it in, check its power, and reopen it")
 
     def _read(self) -> bytes:
-        """Bytes received; if there are none, waits for the port's read time-out."""
+        """Bytes received; if there are none, waits for one byte, at most until the port's read time-out."""
         try:
             return self.port.read(max(1, self.port.in_waiting))
         except OSError as error:

@@ -117,7 +117,8 @@ class Assembler:
     def feed(self, words: Words) -> Frames:
         """The measurements completed by `words`.
 
-        Raises ConnectionLost if counter and time stamp jump permanently: the sensor was switched off in between.
+        Raises ConnectionLost if counter and time stamp jump permanently, or if only distances are received: the sensor
+        was switched off in between.
         """
         code, counter, ticks = self._blocks(words)
         if not code.size:

@@ -158,7 +158,7 @@ def find_lasers(ports: Sequence[str] | None = None) -> list[FoundLaser]:
     """The sensors on `ports`, by default on all ports that the system lists.
 
     Sends only queries, at each possible baud rate, so that the settings of a sensor do not change and a stream
-    continues. Takes about 4 s, for all ports in parallel.
+    continues. Takes about 4 s, since all ports are searched in parallel.
     """
     names = list(dict.fromkeys(listed_ports() if ports is None else ports))
     if not names:

@@ -82,7 +82,8 @@ _RATES = "sensors support 250, 500, 1000, 2000 and 4000 1/s, newer ones also 800
 
 
 def _set_rate(dialogue: Dialogue, rate: float) -> bool:
-    """Set the rate, in kHz, and read it back, since a rejected rate would merely cause a wrong time scale.
+    """Set the rate, which the command takes in kHz, and read it back: a rate that the sensor did not adopt would go
+    unnoticed and falsify the time scale.
 
     Returns False if the sensor lacks the query, which the manual does not document; the values must then be counted.
     """
@@ -115,8 +116,8 @@ a thread of normal priority, which busy processors delay by tenths of a second.
 """
 _QUIET, _DRAINED = 0.05, 0.5
 _COUNTING, _COUNTED = 0.5, 0.2
-"""Duration [s] of counting values, and largest relative deviation from the set rate; rates differ by a factor of
-two.
+"""Duration [s] of counting values, and largest relative deviation from the set rate; neighbouring rates differ by a
+factor of two.
 """
 
 
@@ -176,7 +177,8 @@ class SerialLaser:
     def start(self) -> None:
         """Switch the stream on, with index and time at zero, and return when values are accepted.
 
-        Raises DeviceTimeout if they do not arrive in the configured format, ConnectionLost.
+        Raises DeviceTimeout if they do not arrive in the configured format, InvalidInput if they arrive at another
+        rate, ConnectionLost if the port has disappeared.
         """
         self._require_open("start")
         if self._streaming:
@@ -249,7 +251,9 @@ class SerialLaser:
         self.close()
 
     def _require_counted_rate(self, stream: Stream) -> None:
-        """Count the values of a sensor that does not report its rate. Raises InvalidInput if it is not the set rate."""
+        """Count the values of a sensor that does not report its rate. Raises InvalidInput if they do not arrive at the
+        set rate.
+        """
         began, counted = now(), [stream.take()]
         while now() - began < _COUNTING:
             stream.wait(_COUNTING)

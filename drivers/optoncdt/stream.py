@@ -145,7 +145,7 @@ class Stream:
             self._changed.notify_all()
 
     def _fail(self, error: ConnectionLost) -> None:
-        """Raise `error` from every later call."""
+        """Make every later call raise `error`."""
         with self._changed:
             self._failure = error
             self._changed.notify_all()

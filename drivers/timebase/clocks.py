@@ -35,7 +35,9 @@ class SampleClock:
         self._slope = self._offset = self._residual = np.nan
 
     def observe(self, before: float, count: int, after: float) -> None:
-        """Add a reading: `count` samples taken at a time between `before` and `after` [s of the machine's clock]."""
+        """Add a reading: at some instant between `before` and `after` [s of the machine's clock], `count` samples had
+        been taken.
+        """
         if count < 1:
             return
         if np.isinf(self._fitted) and not self._looks:

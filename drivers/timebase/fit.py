@@ -130,7 +130,7 @@ def _side(seconds: NDArray[np.float64], delay: NDArray[np.float64], sign: float)
 
 
 def _without_stalls(side: _Side, slope: float) -> _Side:
-    """The side without outliers above the line of about this slope."""
+    """The side without outliers far above its line, of which only the approximate slope is needed."""
     above = side.delay - side.sign * slope * side.seconds
     above -= above.min()
     kept = above <= _FAR * typical(above) + _RESOLUTION
@@ -174,8 +174,8 @@ def typical(above: NDArray[np.float64]) -> float:
 def bends(points: Points, slope: float, tolerance: float) -> bool:
     """Whether the points deviate from the line by more than `tolerance` [s] plus chance, as after a change of the rate.
 
-    Compares the smallest delays of the last three quarters. The first is ignored, since its readings may have been made
-    differently.
+    Compares the smallest delays of the last three quarters of the history. The first quarter is ignored, since its
+    readings may have been made differently.
     """
     size = len(points) // 4
     if size < _QUARTER:

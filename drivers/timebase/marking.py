@@ -18,14 +18,16 @@ _SPACING = 0.0125
 _CYCLES = 16
 """Least number of measuring cycles between two pulses."""
 _BEGIN = 0.05
-"""Time from the start of the sample clock to the first pulse [s], for measurements with the beam before it."""
+"""Time from the start of the sample clock to the first pulse [s], during which the sensor measures with its beam on."""
 _ENOUGH = 20
 """Least number of edges found for an alignment."""
 
 
 @dataclass(frozen=True)
 class Pulses:
-    """A train of `number` pulses on the sample clock, the first one at `delay`; each is `high`, then `low` [s]."""
+    """A train of `number` pulses on the sample clock, the first one at `delay` [s]; each lasts `high` [s], followed by
+    a pause of `low` [s].
+    """
 
     delay: float
     high: float
@@ -34,12 +36,12 @@ class Pulses:
 
     @property
     def edges(self) -> NDArray[np.float64]:
-        """Times at which the pulses begin, shape (number,)."""
+        """Times at which the pulses begin [s], shape (number,)."""
         return self.delay + (self.high + self.low) * np.arange(self.number, dtype=np.float64)
 
     @property
     def end(self) -> float:
-        """End of the last pulse."""
+        """End of the pause after the last pulse [s]."""
         return self.delay + (self.high + self.low) * self.number
 
 
@@ -55,9 +57,9 @@ def expected_uncertainty(rate: float) -> float:
 
 
 _ERROR = 0.014
-"""Root mean square error of the middle between the bounds of 40 edges over all phases, in measuring cycles."""
+"""Root mean square error, over all phases, of the midpoint between the bounds from 40 edges, in measuring cycles."""
 _RATES = 1e-6 * np.arange(-150.0, 151.0)
-"""Deviations from the given rate that are searched; from arrivals it is known to a few 10 ppm at worst."""
+"""Deviations from the given rate that are searched; a rate from arrival times is wrong by a few 10 ppm at worst."""
 _RATE_SPREAD = 40e-6
 """Standard uncertainty of the given rate in the first second of a run, on a busy computer [1]."""
 
@@ -79,8 +81,9 @@ def marked_point(
     """The point at the middle of the pulses, which depends least on the rates of the clocks, from measurements at
     ascending `time` [s of the sensor's clock], shape (n,), with and without the beam.
 
-    `rate` are seconds of the sample clock per second of the sensor, `rough` is the sample clock at second 0 of the
-    sensor to within half the time between two pulses. Returns None if fewer than half of the edges are found.
+    `rate` is the number of seconds of the sample clock per second of the sensor; `rough` is the second of the sample
+    clock at second 0 of the sensor, to within half the time between two pulses. Returns None if fewer than half of the
+    edges are found.
     """
     onsets = np.flatnonzero(is_lit[:-1] & ~is_lit[1:]) + 1
     if not onsets.size:
@@ -89,7 +92,7 @@ def marked_point(
     candidates = pulses.edges - rate * float(time[onsets[0]])
     rough = float(candidates[np.argmin(np.abs(candidates - rough))])
     cycle = float(np.median(np.diff(time)))
-    # without the values next to a gap
+    # onsets next to a gap are excluded
     onsets = onsets[time[onsets] - time[onsets - 1] < 1.5 * cycle]
     offsets = pulses.edges[:, None] - rate * time[onsets]
     edge = np.argmin(np.abs(offsets - rough), axis=0)

@@ -63,7 +63,7 @@ class Resampler:
         """Counts at sensor times, shape (n,), by linear interpolation between readings.
 
         Where one of the two readings is not a distance, its fault mark is returned; where a reading is missing, the
-        mark of lost values.
+        mark of lost values; after the last reading, the mark of late values.
         """
         seen = np.full(times.shape, self._late_mark, dtype=np.int16)
         if self._end < 2:

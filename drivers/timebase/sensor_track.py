@@ -130,7 +130,7 @@ class SensorTrack:
         self._asked = 0.0
 
     def begin(self) -> None:
-        """Begin a run: the counts of values restart, and the history of the sensor's clock is kept."""
+        """Begin a run: the counts of values are reset, and the history of the sensor's clock is kept."""
         self._course = Course()
         self._mark = None
         self._values = self._lost = self._late = 0
@@ -159,7 +159,9 @@ class SensorTrack:
         return self._course.reach(line, last[1])
 
     def mark(self, clock: SampleClock, pulses: Pulses) -> bool:
-        """Align the clock by pulses that have switched the sensor's beam off. Returns False if it has not followed."""
+        """Align the clock by pulses that have switched the sensor's beam off. Returns False if too few of them are
+        found in its values, or its clock is still unknown.
+        """
         self._mark = None
         line = self._line(clock)
         if line is None:
