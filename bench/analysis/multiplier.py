@@ -34,7 +34,7 @@ SIGNIFICANT = 3.0
 """Smallest norm of a pair's part of the series, relative to that expected of noise alone."""
 
 PENCIL = 3
-"""Number of cycles, divided by the length of the rows of the matrix pencil."""
+"""Ratio of the number of cycles to the row length of the matrix pencil."""
 
 NEAR, FAR = 2, 6
 """Frequencies next to that of the pair, in units of 1 / n per cycle, at which the spectrum of the residual is compared

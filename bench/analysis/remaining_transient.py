@@ -2,8 +2,8 @@
 
 A slow mode of a settling motion changes the peak from cycle to cycle by C rho^n cos(psi n + phase). Modes with a large
 angle psi per cycle, such as those of a rocking frame (2 to 3 rad), average out within a few cycles; a mode with psi = 0
-shifts the mean. The modes are fitted to all cycles at a constant drive, and the squared shift of the mean of the
-measured cycles is averaged over decays and angles with their likelihood as weight. The shift is not subtracted: its
+shifts the mean. Each mode is fitted separately to all cycles at a constant drive, and the squared shift of the mean of
+the measured cycles is averaged over decays and angles with their likelihood as weight. The shift is not subtracted: its
 mean square is the squared uncertainty.
 """
 
@@ -60,9 +60,12 @@ def remaining_transient(series: Array, measured: int) -> float:
 
 @dataclass(frozen=True, eq=False)
 class _Fit:
-    """Least-squares fit of a constant and both parts of each of K modes over n cycles: `modes`, shape (K, n, 3); the
-    `inverse` of their normal matrix, (K, 3, 3); the mean of the parts over the measured cycles, `share`, (K, 3); and
-    the variance of the fitted mode's mean relative to that of white noise, `gains`, (K,).
+    """Least-squares fits over n cycles, one for each of K modes: the series is fitted by a constant and the mode's real
+    and imaginary part.
+
+    `modes`, shape (K, n, 3), are the basis functions; `inverse`, (K, 3, 3), the inverse normal matrices; `share`, (K,
+    3), the means of the basis functions over the measured cycles, zero for the constant; and `gains`, (K,), the
+    variance of the fitted mode's mean over the measured cycles, for white noise of unit variance in the series.
     """
 
     modes: Array
@@ -72,7 +75,7 @@ class _Fit:
 
     @staticmethod
     def of(decays: Sequence[float] | Array, angles: Sequence[float] | Array, n: int, measured: int) -> "_Fit":
-        """The fit of the modes with every combination of modulus and angle [rad]."""
+        """The fits of the modes with every combination of modulus and angle [rad]."""
         modes = _modes(*np.meshgrid(decays, angles, indexing="ij"), n)
         # the imaginary part of a mode with psi = 0 or pi is zero
         normal = modes.transpose(0, 2, 1) @ modes
@@ -97,7 +100,7 @@ def _coarse(n: int, measured: int) -> _Fit:
 
 @lru_cache(maxsize=64)
 def _fine_fit(n: int, measured: int, decay: int, angle: int) -> _Fit:
-    """The fit of modes around an element of the grid."""
+    """The fits of the modes around one point of the coarse grid."""
     return _Fit.of(_around(DECAYS, decay), _around(ANGLES, angle), n, measured)
 
 

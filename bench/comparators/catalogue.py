@@ -30,7 +30,8 @@ further subdivision".
 
 
 def paper(problem: Problem, step: float) -> Motion:
-    """Section 3.3 of the paper, literally.
+    """Integrate by the procedure of section 3.3 of the paper, unchanged: RK4 with the fixed `step` [s], where an impact
+    is a change of the sign of theta from one step to the next.
 
     If the excitation is a sampled record, a step with an impact is repeated in SEISMIC_PARTS parts.
     """

@@ -22,6 +22,7 @@ class Problem:
     times : times of the samples, shape (m,) [s].
     sampled : whether samples are requested.
     peaks_from : time from which peaks are determined [s]; infinite if no peaks are requested.
+    overturning_angle : tilt at which the block counts as overturned [rad].
     """
 
     parameters: NDArray[np.float64]

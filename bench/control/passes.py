@@ -55,7 +55,7 @@ class Verdict:
         unit = UNITS[self.binds]
         return (
             f"{self.binds} of {self.demand:.4g} {unit} exceeds its limit of {self.allowed:.4g} {unit}; "
-            f"{self.share:.1%} of it is possible"
+            f"{self.share:.1%} of the change is possible"
         )
 
 

@@ -173,7 +173,9 @@ class _Trimmed(NamedTuple):
 
 def _trimmed(record: SampledRecord, share: float) -> _Trimmed:
     if not 0.0 < share < 0.5:
-        raise InvalidInput("trim", share, "the fraction of the Arias intensity trimmed at each end must be 0 to 0.5")
+        raise InvalidInput(
+            "trim", share, "the fraction of the Arias intensity trimmed at each end must be above 0 and below 0.5"
+        )
     intensity: Array = np.cumsum(record.acceleration**2)
     whole = float(intensity[-1])
     first, last = (int(np.searchsorted(intensity, part * whole)) for part in (share, 1.0 - share))
@@ -183,7 +185,7 @@ def _trimmed(record: SampledRecord, share: float) -> _Trimmed:
     beyond = np.maximum(np.maximum(first - place, place - last), 0) / room
     kept = record.acceleration[start : stop + 1] * 0.5 * (1.0 + np.cos(np.pi * beyond))
     said = f"kept {first * record.dt:.4g} to {last * record.dt:.4g} s of {record.duration:.4g} s"
-    said += f": {100.0 * share:g} % of the Arias intensity removed at either end"
+    said += f": {100.0 * share:g} % of the Arias intensity removed at each end"
     return _Trimmed(SampledRecord(kept, record.dt), start * record.dt, said)
 
 

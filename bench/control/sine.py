@@ -66,8 +66,8 @@ class SineResponse:
     def of(cycles: Sequence[Cycle], sine: Sine, turn: complex) -> "SineResponse":
         """The means over two or more `cycles` of a dwell, with phases relative to `turn` (see `Sine.turn`).
 
-        The uncertainty follows from the scatter of the cycles, and is at least that of all harmonics together, since a
-        few cycles may agree by chance.
+        The uncertainty follows from the scatter of the cycles, and is at least that from the variance averaged over all
+        harmonics, since a few cycles may agree by chance.
         """
         unit = sine.amplitude * turn**_ORDERS
         driven, moved = (

@@ -25,7 +25,7 @@ _REACH = exp2(1.0 / 6.0)
 
 
 def octave_mean(values: NDArray[Number], frequency: NDArray[np.float64]) -> NDArray[Number]:
-    """Mean of `values` within a third of an octave around each `frequency`, positive and ascending, same shape."""
+    """Mean of `values` over a third-octave band centred on each `frequency`, positive and ascending, same shape."""
     total: NDArray[Number] = np.concatenate((np.zeros(1, values.dtype), np.cumsum(values)))
     first = np.searchsorted(frequency, frequency / _REACH)
     last = np.searchsorted(frequency, frequency * _REACH, side="right")

@@ -156,7 +156,8 @@ SMALL = 2**20
 
 @dataclass(frozen=True)
 class Integrity:
-    """`failing` holds the changed datasets by path; `compared` is the number of datasets compared with a checksum.
+    """`compared` is the number of datasets that match their checksum. `failing` holds a message for each dataset or
+    group that was changed, is missing or cannot be read, by path.
 
     `unchecked` holds the paths of the other datasets: those without a checksum, as in a file that was not closed, and
     those too large for the requested check.

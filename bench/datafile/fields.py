@@ -195,5 +195,5 @@ def _classify(item: str, annotation: Any) -> tuple[Kind, bool]:
             if issubclass(annotation, types):
                 return kind, False
     raise InvalidInput(
-        item, repr(annotation), "a recorded field must be a number, a switch or a text, or optionally None"
+        item, repr(annotation), "a recorded field must be a number, a switch or a string; each may also be None"
     )

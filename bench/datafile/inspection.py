@@ -120,8 +120,8 @@ def _journal(path: Path) -> str | None:
 
 @dataclass(frozen=True)
 class Verdict:
-    """Result of a verification: the number of datasets, how many of them were compared with a checksum, and a message
-    for every problem.
+    """Result of a verification: the number of datasets, how many of them match their checksum, and a message for every
+    problem.
     """
 
     datasets: int

@@ -134,7 +134,7 @@ def write_ends(record: DataFile, path: Path, entry: hdf5.Group, lengths: Mapping
 
 
 def write_note(record: DataFile, path: Path, entry: hdf5.Group, result: Recovery) -> None:
-    """Add a note on the recovery, and one on each damaged object."""
+    """Add one note: the lines of earlier recoveries, a line on this recovery, and a line for each damaged object."""
     recovered = (
         f"from {path.name} of format {record.format_version}: {result.rows} samples per channel kept,"
         f" {result.loss or 'no rows'} lost, {result.from_journal} events and {result.points_from_journal} points from"

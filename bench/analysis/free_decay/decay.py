@@ -24,7 +24,7 @@ _HELD = 0.5
 """Time at the start of a recording during which the storey is still held [s]."""
 
 _SLIPPED = 0.1
-"""Fraction of a storey's later motion at which the storey counts as released."""
+"""Fraction of a storey's largest later displacement at which the storey counts as released."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,8 +96,8 @@ def _decay(stretch: Stretch, setting: Setting, quiet: float, begin: float) -> De
 
 
 def _released(stretch: Stretch) -> float:
-    """Time [s] at which storey 2 is released: it has then moved by a fraction of its later motion. Raises Unusable if
-    there was no release.
+    """Time [s] at which storey 2 is released: it has then moved by a fraction of its largest later displacement. Raises
+    Unusable if there was no release.
     """
     seen = stretch.readings[1] - np.nanmedian(stretch.readings[1][stretch.time < _HELD])
     moved = np.nan_to_num(np.abs(seen))

@@ -41,9 +41,7 @@ PUSH = 0.03
 
 @dataclass(frozen=True, eq=False)
 class Tilt:
-    """Result of one tilt. The `relation` uses the critical angle from the geometry, the `fit` identifies the critical
-    angle.
-    """
+    """Result of one tilt. The `relation` uses the critical angle from the geometry, while the `fit` identifies it."""
 
     recording: Recording
     swings: Swings
@@ -235,7 +233,7 @@ class Findings:
 
 
 def findings(tilts: Sequence[Tilt], laser: LaserErrors, height: float, height_uncertainty: float) -> Findings:
-    """Combine the tilts. For a single tilt, the uncertainty contains only the scatter of its residual.
+    """Combine the tilts. For a single tilt, the uncertainty has no contribution from the scatter between tilts.
 
     Errors of the beam's `height` [m] and of the laser's scale affect the conversion to an angle: they affect alpha
     fully, the amplitude relation slightly, and r and p, which depend on time, not at all. p has the error of the sample

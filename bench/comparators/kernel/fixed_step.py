@@ -139,7 +139,8 @@ def run_paper(
     peaks_from: float,
     report: NDArray[np.float64],
 ) -> None:
-    """Section 3.3 of the paper, literally: steps `dt` on one grid, impacts detected by theta_{i-1} theta_i < 0.
+    """Integrate by the procedure of section 3.3 of the paper, unchanged: steps `dt` on one grid, impacts detected by
+    theta_{i-1} theta_i < 0.
 
     parts : 1 for the harmonic procedure, with the impact at the step's end; more for the seismic procedure, which
     repeats the step in this number of parts, with the impact at the end of the part in which the sign changes. The
