@@ -33,6 +33,11 @@ EVIDENCE = 20.0
 SIGNIFICANT = 3.0
 """Smallest norm of a pair's part of the series, relative to that expected of noise alone."""
 
+SHARE = 0.2
+"""Smallest part of a second pair in the series, relative to that of the larger one, for which it may be the dominant
+pair.
+"""
+
 PENCIL = 3
 """Ratio of the number of cycles to the row length of the matrix pencil."""
 
@@ -85,7 +90,7 @@ def linear_part(series: Array, orbit: Array, bound: float = BOUND) -> slice:
 
 
 def dominant_multiplier(series: Array) -> Multiplier | None:
-    """Pair with the greatest part in `series`, shape (n, m), of successive cycles at a constant drive.
+    """Slowest pair with a considerable part in `series`, shape (n, m), of successive cycles at a constant drive.
 
     None if there are fewer than `SHORTEST` cycles, or if no pair is significant. Raises ValueError for values that are
     not finite.
@@ -104,15 +109,13 @@ def dominant_multiplier(series: Array) -> Multiplier | None:
         return None
     best = single
     if n >= TWICE and (double := _fitted(scaled, 2)) is not None:
-        # the slower of two pairs must not be the smaller one, since that would be noise
-        slower = abs(double.multipliers[0]) > abs(double.multipliers[1])
-        best = double if slower and double.criterion < single.criterion - EVIDENCE else single
+        best = double if double.criterion < single.criterion - EVIDENCE else single
     return _stated(best, size) if best.significance >= SIGNIFICANT else None
 
 
 @dataclass(frozen=True, eq=False)
 class _Fit:
-    """A fit: its multipliers, the one with the greatest part first, the residual, shape (n, m), the derivatives of the
+    """A fit: its multipliers, the dominant one first, the residual, shape (n, m), the derivatives of the
     weighted residual, shape (n, m, 2 pairs), with respect to logarithm of modulus and angle of each pair, the weights,
     shape (m,), the information `criterion`, and the `significance` of the first pair.
     """
@@ -148,9 +151,12 @@ def _fitted(series: Array, pairs: int) -> _Fit | None:
     if np.linalg.matrix_rank(slopes) < 2 * pairs:
         return None
     parts = _parts(series, unknowns) * weights
-    order = np.argsort(-np.linalg.norm(parts, axis=(1, 2)))
-    residual = _left(series, unknowns)
+    sizes = np.linalg.norm(parts, axis=(1, 2))
     multipliers = np.exp(unknowns[::2] + 1j * unknowns[1::2])
+    # a much smaller pair fits noise, however slowly it decays
+    moduli = np.where(sizes >= SHARE * sizes.max(), np.abs(multipliers), 0.0)
+    order = np.argsort(-moduli)
+    residual = _left(series, unknowns)
     criterion = 2.0 * n * float(np.sum(np.log(1.0 / weights))) + 2 * pairs * (1 + m) * log(n * m)
     # the noise in the part of a pair has two degrees of freedom per coefficient
     significance = float(np.linalg.norm(parts[order[0]])) / (2.0 * m) ** 0.5

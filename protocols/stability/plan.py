@@ -28,7 +28,7 @@ from protocols.common.sine.calibration import REST, bare_calibration, end_test, 
 from protocols.common.sine.holding import Hold, capture_and_measure, prepared
 from protocols.common.sine.pace import Pace
 from protocols.common.sine.settling import Held, Report, Settled, settle_and_measure
-from protocols.stability.prediction import Predicted, predicted, rocking
+from protocols.stability.prediction import Predicted, close_pair, predicted, rocking
 from protocols.stability.protocol import OrbitStatus, StabilityParameters, StabilityPoint
 from protocols.stability.release import Released, combined, parts_of, release
 
@@ -156,7 +156,7 @@ class StabilityPlan:
             reason = "the model has no rocking orbit here" if orbit is None else "no control stabilises the orbit"
             return StabilityPoint(**fields, status=OrbitStatus.NOT_HELD, reason=reason)
         found = predicted(orbit, configuration.known_on_table, shaker, p.harmonics)
-        fields |= _predicted_fields(found)
+        fields |= {**_predicted_fields(found), "reason": close_pair(orbit)}
         sine = Sine(place.omega, amplitude, calibration)
         falls, last = 0, StabilityPoint(**fields, status=OrbitStatus.OVERTURNED)
         for tried, start in enumerate(starts, 1):

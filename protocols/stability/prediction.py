@@ -3,7 +3,7 @@
 from cmath import phase
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import hypot, nan
+from math import degrees, hypot, nan
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,9 @@ Array = NDArray[np.float64]
 
 STEP = 0.002
 """Relative change of the amplitude in the finite difference of its sensitivity."""
+
+CLOSE = 0.02
+"""Difference of the moduli of two pairs below which the uncertainty of a specimen may exchange their order."""
 
 
 @dataclass(frozen=True)
@@ -45,6 +48,20 @@ def rocking(specimen: Specimen, omega: float, amplitude: float) -> Orbit | None:
     """The rocking orbit at `omega` [rad/s] and `amplitude` [m/s2]; None if there is none."""
     branch = predict_gain(specimen, omega, amplitude).rocking
     return None if branch is None else branch.orbit
+
+
+def close_pair(orbit: Orbit) -> str:
+    """Remark on a second pair of multipliers on fixed ground whose modulus differs by at most `CLOSE` from that of the
+    slowest one; empty if there is none.
+    """
+    slowest = orbit.slowest
+    others = [complex(each) for each in orbit.multipliers if each.imag > 0.0 and abs(each - slowest) > 1e-9]
+    if not others or abs(second := max(others, key=abs)) < abs(slowest) - CLOSE:
+        return ""
+    return (
+        f"the model has a second pair of modulus {abs(second):.4f} at {degrees(phase(second)):.1f} degrees: the actual "
+        "specimen may have the slower pair there, which was not deflected"
+    )
 
 
 def on_table(orbit: Orbit, shaker: Shaker | None, harmonics: int) -> complex | None:

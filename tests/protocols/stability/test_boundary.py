@@ -9,7 +9,7 @@ from bench.config.sections import Acquisition
 from protocols.common.sine.holding import prepared
 from protocols.stability.experiment import StabilityTest
 from protocols.stability.plan import Place, StabilityPlan
-from protocols.stability.prediction import boundaries, predicted, rocking
+from protocols.stability.prediction import boundaries, close_pair, predicted, rocking
 from protocols.stability.protocol import OrbitStatus, StabilityParameters, StabilityPoint
 from protocols.stability.release import DEFLECTION, deflection
 from protocols.stability.results import boundary_texts, measured_boundaries
@@ -134,3 +134,8 @@ def test_the_bisection_takes_the_middle_of_the_widest_bracket() -> None:
 
 def test_a_design_exists_for_stable_orbits_too() -> None:
     assert prepared(orbit(16.0, 0.4), None, 1) is not None
+
+
+def test_a_second_pair_of_nearly_equal_modulus_is_remarked() -> None:
+    assert "second pair of modulus 0.9736 at 148.8 degrees" in close_pair(orbit(15.6, 0.97))
+    assert close_pair(orbit(15.0, 0.97)) == ""
