@@ -6,10 +6,10 @@
 Each run is `rockbench run stability` on the simulated bench, whose storeys and spring are off by up to `--share`
 (rectangular), its damping by 30 % and its restitution by 1 %; the scale of its accelerometer is off with a standard
 deviation of 0.5 %, as configured. The truth is computed with `sim.table_orbit` for the drawn specimen at the stated
-amplitude, so that the error of the scale counts. The measured pair is compared with the nearest one;
-where another pair is slower, this is counted. Printed for each run: errors of modulus and angle, absolute and in expanded uncertainties. In
-the end: rms error, and the shares covered. With `--boundary`, each run brackets the boundary between two frequencies;
-its truth is found by bisection.
+amplitude, so that the error of the scale counts. The measured pair is compared with the nearest one; where another
+pair is slower, this is counted. Printed for each run: errors of modulus and angle, absolute and in expanded
+uncertainties. In the end: rms error, and the shares covered. With `--boundary`, each run brackets the boundary between
+two frequencies; its truth is found by bisection.
 """
 
 import argparse
