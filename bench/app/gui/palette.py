@@ -17,6 +17,11 @@ def desktop_theme() -> Theme:
     return DARK if QGuiApplication.styleHints().colorScheme() == Qt.ColorScheme.Dark else LIGHT
 
 
+def chosen_theme(name: str) -> Theme:
+    """The theme `light` or `dark`; for any other name, that of the desktop."""
+    return {"light": LIGHT, "dark": DARK}.get(name) or desktop_theme()
+
+
 def qt_palette(theme: Theme) -> QPalette:
     """The Qt palette of a theme."""
     palette = QPalette()

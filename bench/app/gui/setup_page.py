@@ -4,6 +4,7 @@ from pathlib import Path
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import (
+    QComboBox,
     QHBoxLayout,
     QLabel,
     QPlainTextEdit,
@@ -19,7 +20,7 @@ from bench.app.gui.background import Command
 from bench.app.gui.check_panel import CheckPanel
 from bench.app.gui.configuration_tree import ConfigurationTree
 from bench.app.gui.controller import Controller
-from bench.app.gui.widgets import FITTING, ask_for_files, give_key, scrolling, set_level, why_no_dialog
+from bench.app.gui.widgets import FITTING, ask_for_files, give_key, ignore_wheel, scrolling, set_level, why_no_dialog
 from bench.config.model import BenchConfiguration
 from bench.config.result_files import read_specimen
 from bench.config.toml import former_keys, read_configuration, with_identified
@@ -105,6 +106,12 @@ class SetupPage(QWidget):
         self.open_file, self.open_specimen = QPushButton(texts.OPEN_CONFIGURATION), QPushButton(texts.OPEN_SPECIMEN)
         self.tree, self.devices = ConfigurationTree(), DevicesPanel(controller)
         self.loop = CheckPanel(controller, theme)
+        self.theme = QComboBox()
+        for name, text in texts.THEMES.items():
+            self.theme.addItem(text, name)
+        self.theme.setAccessibleName(texts.THEME)
+        self.theme.setToolTip(texts.THEME_TIP)
+        ignore_wheel(self.theme)
         self._arrange()
         self.open_file.clicked.connect(self._ask_configuration)
         self.open_specimen.clicked.connect(self._ask_specimen)
@@ -185,6 +192,10 @@ class SetupPage(QWidget):
         buttons.addWidget(self.open_specimen)
         column.addLayout(buttons)
         column.addWidget(self.tree, 1)
+        colours = QHBoxLayout()
+        colours.addWidget(QLabel(texts.THEME))
+        colours.addWidget(self.theme, 1)
+        column.addLayout(colours)
         right = QSplitter(Qt.Orientation.Vertical)
         right.setChildrenCollapsible(False)
         for part in (self.devices, self.loop):

@@ -28,7 +28,7 @@ from bench.app.display.trouble import Trouble
 from bench.app.gui.attach import SessionWatch
 from bench.app.gui.controller import Controller
 from bench.app.gui.header import Header, StopFilter
-from bench.app.gui.palette import desktop_theme, dress
+from bench.app.gui.palette import chosen_theme, dress
 from bench.app.gui.panels import LeavePanel, PanelArea, Prompt, Tour
 from bench.app.gui.protocol_page import ProtocolPage
 from bench.app.gui.queue_page import QueuePage
@@ -245,14 +245,15 @@ def open_window(
     application = QApplication(sys.argv[:1])
     application.setOrganizationName("rocking-bench")
     application.setApplicationName("rocking-bench")
-    theme = desktop_theme()
+    settings = QSettings()
+    theme = chosen_theme(str(settings.value("theme", "")))
     dress(application, theme)
     controller = Controller()
     window = Window(
-        controller, configuration, entries, theme, path=path, settings=QSettings(), queue=queue, tour=path is None
+        controller, configuration, entries, theme, path=path, settings=settings, queue=queue, tour=path is None
     )
     undo = attend(window, controller, application)
-    _follow_desktop(window, application)
+    follow_choice(window, application, settings)
     window.show()
     code = application.exec()
     controller.close()
@@ -282,12 +283,21 @@ def attend(window: Window, controller: Controller, application: QApplication) ->
     return undo
 
 
-def _follow_desktop(window: Window, application: QApplication) -> None:
-    """Follow the desktop's light or dark theme, also when it changes."""
+def follow_choice(window: Window, application: QApplication, settings: QSettings) -> None:
+    """Use the theme that is selected on the Setup page and kept in `settings`; without a selection, follow the desktop,
+    also when it changes.
+    """
+    choice = window.setup.theme
+    choice.setCurrentIndex(max(choice.findData(settings.value("theme", "")), 0))
 
     def follow() -> None:
-        theme = desktop_theme()
+        theme = chosen_theme(str(choice.currentData()))
         dress(application, theme)
         window.use_theme(theme)
 
+    def choose() -> None:
+        settings.setValue("theme", choice.currentData())
+        follow()
+
+    choice.currentIndexChanged.connect(choose)
     application.styleHints().colorSchemeChanged.connect(follow)

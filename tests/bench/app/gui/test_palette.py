@@ -1,10 +1,19 @@
 """Contrast of every text with what is behind it, after WCAG 2.2, 1.4.3: 4.5 for text of this size, 3 for lines."""
 
-import pytest
-from PySide6.QtGui import QColor, QPalette
+from pathlib import Path
 
+import pytest
+from PySide6.QtCore import QSettings
+from PySide6.QtGui import QColor, QPalette
+from PySide6.QtWidgets import QApplication
+from pytestqt.qtbot import QtBot
+
+from bench.app.catalogue import all_protocols
 from bench.app.display.theme import DARK, LIGHT, Theme
-from bench.app.gui.palette import qt_palette
+from bench.app.gui.controller import Controller
+from bench.app.gui.palette import chosen_theme, dress, qt_palette, style_sheet
+from bench.app.gui.window import Window, follow_choice
+from bench.config.model import BenchConfiguration
 
 
 def _luminance(colour: QColor) -> float:
@@ -43,3 +52,26 @@ def test_the_formula_is_the_published_one() -> None:
     assert _contrast(QColor("black"), QColor("white")) == pytest.approx(21.0)
     # the lightest grey that passes on white: WebAIM's table
     assert _contrast(QColor("#767676"), QColor("white")) == pytest.approx(4.54, abs=0.01)
+
+
+def test_a_theme_chosen_by_hand_is_kept(qtbot: QtBot, tmp_path: Path) -> None:
+    application = QApplication.instance()
+    assert isinstance(application, QApplication)
+    settings = QSettings(str(tmp_path / "kept.ini"), QSettings.Format.IniFormat)
+    controller = Controller()
+    try:
+        for chosen in ("dark", "light"):
+            window = Window(controller, BenchConfiguration(), all_protocols()[0], LIGHT)
+            qtbot.addWidget(window)
+            follow_choice(window, application, settings)
+            window.setup.theme.setCurrentIndex(window.setup.theme.findData(chosen))
+            assert application.styleSheet() == style_sheet(chosen_theme(chosen))
+            assert settings.value("theme") == chosen
+        assert chosen_theme("dark") is DARK
+        again = Window(controller, BenchConfiguration(), all_protocols()[0], LIGHT)
+        qtbot.addWidget(again)
+        follow_choice(again, application, settings)
+        assert again.setup.theme.currentData() == "light"
+    finally:
+        dress(application, LIGHT)
+        controller.close()
