@@ -12,7 +12,9 @@ from contextlib import suppress
 from sim import waiting
 
 OWN_CONSOLE = subprocess.CREATE_NO_WINDOW if sys.platform == "win32" else 0
-"""Creation flag of the child: a closed console ends only the processes attached to it (Windows)."""
+"""Creation flag of the child (Windows): not attached to the program's console, it survives the closing of that
+console.
+"""
 
 ENDING = 2.0
 """Longest wait for a child to end [s]."""

@@ -60,8 +60,6 @@ class Alignment:
     """Alignment of a sensor's own clock to the sample clock in one run.
 
     A value taken at second t of the sensor's clock is placed at second `offset + rate * t + delay` of the sample clock.
-    `residual` is the root mean square residual of the clock readings that bound it [s], `delay` the configured delay
-    [s], `values` the number of values received and `lost` the number of missing ones.
     """
 
     sensor: str = column("", "name of the channel")
@@ -196,7 +194,7 @@ class Rig(Protocol):
         ...
 
     def stop(self) -> None:
-        """End the sample clock with the output at zero. Allowed in every state, and repeatedly."""
+        """Stop the sample clock, with the output at zero. Allowed in every state, and repeatedly."""
         ...
 
     def halt(self) -> None:

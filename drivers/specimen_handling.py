@@ -10,7 +10,7 @@ from sim.errors import InvalidInput
 from sim.specimen import Frame, Specimen
 
 _CLAMPED = 400.0
-"""Factor on the stiffness of storeys clamped to the table, which raises their natural frequencies 20 times."""
+"""Factor on the stiffness of storeys clamped to the table, which raises their natural frequencies by a factor of 20."""
 
 
 class SpecimenHandling:

@@ -57,8 +57,8 @@ class Deadline(grpc.UnaryUnaryClientInterceptor):
 
 
 class ReusedCalls:
-    """A channel that creates the object that calls a procedure of the server once: nidaqmx requests those of all 450
-    procedures for every task.
+    """A channel that creates the object for calling a procedure of the server only once; nidaqmx requests the objects
+    of all 450 procedures for every task.
     """
 
     def __init__(self, channel: Any) -> None:

@@ -82,7 +82,7 @@ def _multiplexed(number: int, total: int, step: float | None, rate: float) -> In
         return InputDelay(0.0, _CLOCKED, "first input of its multiplexer")
     if step is not None:
         return InputDelay(-number * step, _CLOCKED, "AI.ConvRate")
-    # the inputs are at most evenly spaced over the sample period
+    # the time between two inputs is at most the sample period divided by their number
     return InputDelay(0.0, number / (total * rate) / sqrt(3.0), "multiplexer without AI.ConvRate: within a sample")
 
 

@@ -14,7 +14,7 @@ NAME = "rockbench_marker"
 class Marker:
     """Train of `pulses` that begins with the sample clock of each run, at `daq.laser_marker`.
 
-    The lasers are on while the output is low. Counters and sample clock have one timebase on a device.
+    The lasers are on while the output is low. The counters and the sample clock of a device share one timebase.
     """
 
     def __init__(self, connection: Connection, daq: Daq, pulses: Pulses) -> None:

@@ -258,7 +258,9 @@ class DaqSession:
 
     @contextmanager
     def _resting_on_failure(self) -> Generator[None]:
-        """Context manager that stops the bench before an error leaves its body; notes failures of the stop on it."""
+        """Context manager that stops the bench before an error leaves its body; a failure of the stop is added to that
+        error as a note.
+        """
         try:
             yield
         except BaseException as error:

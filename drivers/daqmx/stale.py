@@ -1,4 +1,8 @@
-"""Tasks that a killed program has left on a device server."""
+"""Removal of tasks that a dead client has left on a gRPC device server.
+
+The server keeps tasks indefinitely, independently of connections. Their output holds its last value, their relay may be
+closed, and no other client can use the device.
+"""
 
 from collections.abc import Iterable
 from contextlib import ExitStack

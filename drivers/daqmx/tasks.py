@@ -1,8 +1,4 @@
-"""Tasks of one session, and removal of tasks left by a dead client.
-
-A gRPC device server keeps tasks indefinitely, independently of connections. Their output holds its last value, their
-relay may be closed, and no other client can use the device.
-"""
+"""Tasks of one session with a DAQ device: creation, start and stop in order, release."""
 
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack, suppress

@@ -29,7 +29,7 @@ from drivers.timebase.marking import Pulses, golden_pulses
 _SETTLING = 0.05
 """Time between the last pulse and the first sample of a run [s]."""
 _CHUNK = 0.1
-"""Duration of a read during the pulses [s], short against the time-outs of watchdog and heartbeat relay."""
+"""Duration of a read during the pulses [s], short compared with the time-outs of watchdog and heartbeat relay."""
 _FIRST_READINGS = 20
 """Number of readings of the sample clock after its start, which bound it to within a fraction of a call's duration."""
 
@@ -227,7 +227,7 @@ class HardwareRig(RigBase):
             try:
                 self.halt()
             except RigError as second:
-                # the message must include a relay or output that did not respond
+                # the message must also name the relay or output that could not be set
                 error.args = (f"{error}; {second}", *error.args[1:])
             finally:
                 self._failed = True
@@ -235,7 +235,7 @@ class HardwareRig(RigBase):
 
     @contextmanager
     def _raised_once(self) -> Generator[None]:
-        """Context manager that suppresses the RigError of stopping a device after a failure that was already raised."""
+        """Context manager that suppresses a RigError from stopping the devices if an earlier failure was raised."""
         try:
             yield
         except RigError:

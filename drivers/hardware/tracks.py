@@ -26,8 +26,8 @@ _SHARE, _RESERVE = 0.5, 0.1
 is the time for the next write.
 """
 _LONGEST, _LEAST = 0.4, 0.05
-"""Delay of a block [s] up to which it waits, shorter than the default of `limits.late`, and the longest wait of a block
-that is already later, for values received during a stall of the program.
+"""Delay of a block [s] up to which it waits for late values, shorter than the default of `limits.late`; and the longest
+wait [s] of a block that is already later, which allows for values received during a stall of the program.
 """
 
 
@@ -141,7 +141,7 @@ class Tracks:
         """Counts at `n` samples from `first` on, shape (n, n_tracks); waits for late values.
 
         `lead` is the number of drive samples queued beyond the block. The wait ends in time for the next write,
-        whatever the block has waited for before. Values that have not arrived by then are marked as late; a silent
+        however late the block already is. Values that have not arrived by then are marked as late; a silent
         sensor is not awaited. Raises ConnectionLost, and RigError before a run.
         """
         last = (first + n - 1) / self._sample_rate
@@ -150,7 +150,7 @@ class Tracks:
         return np.column_stack(placed)
 
     def mark(self, pulses: Pulses, lead: int) -> tuple[str, ...]:
-        """Align the sensors by pulses that have switched them off; the names of those that have not followed.
+        """Align the sensors by pulses that have switched them off; returns the names of those that were not aligned.
 
         Waits for late values as `counts` does.
         """
