@@ -174,7 +174,7 @@ class Progress(Event):
 
 @event(notice="point")
 class PointFinished(Event):
-    """A point of the campaign is finished; its result, an instance of `point_type`, is a row of `points`."""
+    """A point of the campaign is finished; its result, an instance of the protocol's `point`, is a row of `points`."""
 
     point: Parameters
 

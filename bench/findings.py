@@ -16,8 +16,8 @@ Array = NDArray[np.float64]
 @event(table="table_response", notice="table", eq=False)
 class TableIdentified(Event):
     """The response of the table has been identified. The arrays, each of shape (n_lines,), contain the values at the
-    frequency lines, in the units of `bench.control.table_model.TableModel`; `text` states the date, the mounted
-    specimen and the rms acceleration.
+    frequency lines, in the units of `bench.control.table_model.TableModel`; `text` states the mounted
+    specimen, the band, the number of lines and the rms acceleration.
     """
 
     text: str

@@ -26,7 +26,7 @@ class LiveValue(Event):
 class Estimate(Event):
     """Running gain coefficient of the point under test; NaN while unknown.
 
-    `predicted` is the prediction for the branch of steady motion that the point's start-up aims at.
+    `predicted` is the prediction for the branch of steady motion at which the start of the test aims.
     """
 
     omega: float = column("rad/s", "circular frequency of the base motion")

@@ -72,7 +72,7 @@ def replace(source: Path, target: Path) -> None:
 
 def finish(temporary: Path, target: Path) -> None:
     """Rename the complete result `temporary` to its final name. Raises OSError."""
-    # listed before the rename: an interrupt may come between any two instructions, and `completed` then looks at the
+    # listed before the rename: an interrupt may come between any two instructions, and `completed` then checks the
     # files
     _names[temporary] = target
     replace(temporary, target)

@@ -105,5 +105,5 @@ class Campaign:
         try:
             found = json.loads(self.record.metadata.get(name, "{}"))
         except json.JSONDecodeError as error:
-            raise InvalidInput("record", str(self.path), f"its {name} are not valid JSON: {error}") from None
+            raise InvalidInput("record", str(self.path), f"its entry {name!r} is not valid JSON: {error}") from None
         return cast(dict[str, Any], found) if isinstance(found, dict) else {}

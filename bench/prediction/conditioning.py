@@ -30,7 +30,7 @@ class Condition:
     `number` is the greatest change of any state until the end, relative to the greatest magnitude of that state, per
     relative change of an input: amplitude, k1, k_C or coefficient of restitution. `error` is the greatest difference
     from a run at the tolerance FINE, relative in the same way, and `end_time_error` [s] that of the end time. All are
-    NaN where the two runs end differently, since no digit of such a motion is known.
+    NaN if the two runs end differently, since no digit of such a motion is known.
     """
 
     number: float

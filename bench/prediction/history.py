@@ -99,7 +99,7 @@ def runs_table(made: Sequence[History]) -> Table:
     columns["end_time_s"] = Column(
         np.array([history.condition.rounded_end(history.end_time) for history in made], np.float64),
         "s",
-        "time at which the motion ended, without the digits that its error makes false",
+        "time at which the motion ended, rounded to the digits that its error leaves valid",
     )
     columns["end_time_error_s"] = Column(
         np.array([history.condition.end_time_error for history in made], np.float64),

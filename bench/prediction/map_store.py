@@ -24,8 +24,8 @@ from sim.map_rows import Continuation
 from sim.process_lock import LockHeld, ProcessLock
 
 STATE, OWN = "state.npz", "unfinished-map"
-"""Names of the state file, and of the file that marks the folder as one that may be removed; beside it is the lock of
-the process that writes to the folder.
+"""Names of the state file, and of the file that marks the folder as one that may be removed; the lock
+of the process that writes to the folder is next to the latter.
 """
 
 TEXT = "<U16"

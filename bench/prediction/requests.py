@@ -166,7 +166,7 @@ class RecordsRequest(Parameters):
         "that of the configured shaker",
     )
     trim: float = quantity(
-        0.0005, "1", "fraction of the Arias intensity removed at either end of a record; 0: none", ge=0, lt=0.5
+        0.0005, "1", "fraction of the Arias intensity removed at each end of a record; 0: none", ge=0, lt=0.5
     )
     length_ratio: float = quantity(
         1.0,
@@ -230,7 +230,7 @@ class StrokeFitRequest(Parameters):
     trim: float = quantity(
         0.0005,
         "1",
-        "fraction of the Arias intensity removed at either end of the record; 0: none",
+        "fraction of the Arias intensity removed at each end of the record; 0: none",
         ge=0,
         lt=0.5,
     )

@@ -227,7 +227,7 @@ def stage_travels(
 
 
 LIKELY = 0.95
-"""Fraction of the drawn specimens whose demands do not exceed the likely demand."""
+"""Quantile of the demands of the drawn specimens that is taken as the likely demand."""
 
 UNKNOWN_SHAKER = {
     "force": "the moving mass is unknown: set hardware.moving_mass and hardware.force_constant",

@@ -1,6 +1,4 @@
-"""Ensemble of specimens drawn from the uncertainty of one specimen, under the same table motion, and the gain of
-each.
-"""
+"""Ensemble of specimens, drawn within the uncertainty of one specimen, under the same table motion; gain of each."""
 
 from collections import deque
 from collections.abc import Sequence

@@ -92,7 +92,7 @@ PROTOCOL = Protocol(
         "The stand-alone block on a locked table is repeatedly tilted and released by hand; a laser measures "
         "its face. The exact nonlinear motion is fitted to each recording, and the amplitudes of the swings "
         "provide a second estimate of the restitution, impact by impact. Other runs load the result, "
-        "specimen.json. The table is not driven. Without options, a run has three tilts to either side and "
+        "specimen.json. The table is not driven. Without options, a run has three tilts to each side and "
         "takes about five minutes."
     ),
     example="--config bench.toml --specimen FILE",

@@ -171,8 +171,8 @@ def _check_pull(parameters: FreeVibrationParameters, configuration: BenchConfigu
 
 
 def _release_forecast(configuration: BenchConfiguration, pull: float, duration: float) -> Forecast:
-    """Demands of releases by hand. There is no drive, and the storeys swing to either side by at most the initial
-    displacement of storey 2.
+    """Demands of releases by hand. There is no drive; the storeys swing from one side to the other, by at most twice
+    the initial displacement of storey 2.
     """
     swing = 2.0 * pull
     moved = dict.fromkeys(bounds(configuration), 0.0)

@@ -46,7 +46,7 @@ QUANTITIES = ("$k_1$", "$k_2$", r"$\xi_1$", r"$\xi_2$")
 
 def decays_table(points: Sequence[DecayPoint], result: FrameResult | None) -> str:
     """Text table with a row for each decay and one for all decays, with expanded uncertainties (k = 2), followed by the
-    correlations.
+    largest contributions and a statement on the damping.
     """
     if not points:
         return "Nothing was identified."
@@ -95,7 +95,7 @@ def _notes(point: DecayPoint, result: FrameResult) -> list[str]:
         if point.damping_is_linear
         else "The damping depends on the amplitude: see the figure; the stated value is its mean over the decays."
     )
-    # the largest contributions in the single decays and in their combination
+    # the largest contribution to each quantity of the combined result
     largest = {
         name: max(result.parts, key=lambda part: float(result.parts[part][index]))
         for index, name in enumerate(("k1", "k2", "xi1", "xi2"))

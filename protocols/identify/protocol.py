@@ -6,7 +6,7 @@ from sim.parameters import Parameters, quantity
 
 
 class IdentifiedBand(Parameters):
-    """Response of the table in a third-octave band, to which relative quantities refer."""
+    """Response of the table in a third-octave band; relative quantities are relative to its gain."""
 
     frequency_hz: float = quantity(..., "Hz", "centre frequency of the third-octave band")
     gain_m_s2_v: float = quantity(..., "m/s2/V", "table acceleration per drive, rms over the lines")

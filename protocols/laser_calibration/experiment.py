@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MARGIN = 1.05
-"""Largest level of the drive calibration relative to the amplitude of the test; it must be within the limits too."""
+"""Allowance for an amplitude larger than the requested one, which must be within the limits, too."""
 
 _COLUMNS = (
     TextColumn("sensor", words=True),

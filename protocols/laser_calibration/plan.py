@@ -38,14 +38,14 @@ END = 5.0
 """Expected duration of the last ramp and of the computation [s]."""
 
 START, CHANGE = 12.0, 3.0
-"""Duration of the sweep to the first pass, and between passes [s].
+"""Duration of a sweep from or to rest, and between passes of the same frequency [s].
 
 If the amplifier controls velocity, an asymmetric ramp leaves the table displaced, and the suspension returns it within
 seconds.
 """
 
 LEVELS = (0.2, 0.7)
-"""Levels of the drive calibration relative to the amplitude; the effect of friction decreases with the level."""
+"""Levels of the drive calibration relative to the amplitude; friction has less effect at the higher level."""
 
 _LOOSE = "storey 1 has a permanent offset although no block is on the table: check lasers and clamps"
 

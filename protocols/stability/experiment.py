@@ -82,7 +82,9 @@ class StabilityTest(Prepared[StabilityParameters]):
         )
 
     def _trials(self, response: TableResponse | None) -> Iterator[Trial]:
-        """Every stage that the plan may reach; the bisection adds sweeps from each start to its neighbours."""
+        """Every stage that the plan may reach; the bisection adds a sweep from the first start of each point to its
+        neighbours.
+        """
         p, known = self.parameters, self.configuration.known_specimen
         lowest = min(p.amplitude_factor) * known.uplift_acceleration
         yield bare_calibration_trial(p, p.omega, lowest, known, response)

@@ -129,7 +129,7 @@ PROTOCOL = Protocol(
     summary="Multipliers of rocking orbits, stable or not, and the boundary between them, against prediction.",
     details=(
         "At each frequency or amplitude, the rocking motion is held on its orbit by small corrections once per cycle, "
-        "deflected slightly and released. From the growth or decay of the deviation follow modulus and angle of the "
+        "deflected slightly and released. The growth or decay of the deviation gives the modulus and angle of the "
         "dominant multiplier. Where the modulus passes 1 between two points, further points bisect the interval. "
         "Without options, it brackets the upper end of the unstable window at beta 0.97 on the simulated bench."
     ),

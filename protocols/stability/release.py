@@ -20,12 +20,12 @@ Array = NDArray[np.float64]
 
 DEFLECTION = 8
 """Number of cycles in which the motion is deflected. At least as many controls as half the states of table and
-specimen are required to leave the other multipliers unexcited; more of them are smaller.
+specimen are required to leave the other multipliers unexcited; a larger number permits smaller controls.
 """
 
 START, LEAST = 0.7, 0.02
-"""Deviation at the release, relative to the largest deviation of a linear motion: of an orbit predicted as stable, and
-the smallest for an unstable one, in which the deviation then grows.
+"""Largest deviation at the release, relative to `BOUND`, for an orbit predicted as stable; and smallest deviation,
+relative to the orbit, for an unstable one, in which the deviation then grows.
 """
 
 LOST = 2.0
