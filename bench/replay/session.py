@@ -195,7 +195,7 @@ def _early_end(record: DataFile, over: str | None) -> str | None:
         return f"{over or 'it ends'}: the program that wrote it was killed, or is still writing"
     if over is None or record.status not in ("failed", "halted", "interrupted"):
         return None
-    return f"{over}: the run {record.status} there, {record.summary}"
+    return f"{over}: the run ended there ({record.status}), {record.summary}"
 
 
 def _changed(metadata: dict[str, str]) -> tuple[str, ...]:

@@ -206,7 +206,7 @@ class Twin:
 
     def _judge(self, run: _Run, estimate: TwinEstimate, now: float) -> None:
         excess, seconds = estimate.excess, estimate.seconds
-        what = f"drift outside the twin's band: rms over 1 s of the excess is {excess:.3g} of the drift"
+        what = f"drift outside the twin's band: rms over 1 s of the excess is {excess:.3g} times the largest rms drift"
         if run.warn.exceeded(excess, seconds) and self._warned_of != self._applicability.specimen:
             self._warned_of = self._applicability.specimen
             self._publish(Warned(f"{what}, limit {run.warn.limit:g}: check which specimen is mounted", time=now))

@@ -58,7 +58,7 @@ class HarmonicPoint(Parameters):
     omega_rad_s: float = quantity(..., "rad/s", "circular frequency of the base motion")
     beta: float = quantity(..., "1", "stiffness ratio of the coupling spring")
     status: PointStatus = quantity(..., "", "motion of the coupled system")
-    layer: str = quantity(..., "", "predicted branch: rocking or resting")
+    layer: str = quantity(..., "", "predicted branch: rocking or resting; none if there is no such branch")
     alpha_2: float | None = quantity(None, "1", "measured gain of the peak drift, coupled over bare")
     alpha_2_uncertainty: float | None = quantity(None, "1", "expanded uncertainty of alpha_2 (k = 2)")
     control_share: float | None = quantity(

@@ -91,7 +91,7 @@ def _holds_section(campaign: Campaign) -> Section | None:
         Picture(
             hold_figure(cycles, row["omega_rad_s"], row["beta"]),
             f"Hold at β = {row['beta']:g}, Ω = {row['omega_rad_s']:g} rad/s: peak drift and control of each cycle, "
-            "from the free motion to the release.",
+            "including those after the release.",
             "Peak drift and control, both logarithmic, against the number of the cycle.",
         )
         for row in held

@@ -1,5 +1,5 @@
 # pyright: reportUnknownMemberType=false
-"""Figure of a hold: peak drift and control in each cycle, from the free motion to the release."""
+"""Figure of a hold: peak drift and control in each cycle, including those after the release."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
