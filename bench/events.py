@@ -144,7 +144,7 @@ class SpecimenMounted(Event):
 class SensorsAligned(Event):
     """Alignment of sensors with free-running clocks to the sample clock in `run`; published at the end of the run."""
 
-    run: int = column("1", "number of armings of the rig")
+    run: int = column("1", "number of the run; each arming of the rig begins one")
     alignments: tuple[Alignment, ...] = column("", "one row for each sensor")
 
     @property

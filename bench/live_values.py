@@ -73,7 +73,7 @@ class TwinEstimate(Event):
     """
 
     time: float = column("s", "bench time at which the block had been read", default=nan, kw_only=True)
-    run: int = column("1", "number of armings of the rig")
+    run: int = column("1", "number of the run; each arming of the rig begins one")
     seconds: float = column("s", "time in the run to which the values apply")
     members: int = column("1", "number of models that form the band, excluding the nominal one")
     standing: float = column("1", "fraction of the models of the band whose block is standing")

@@ -92,7 +92,7 @@ def _comments(text: RecordText) -> int:
 
 
 def _first_row(text: RecordText) -> int | None:
-    """The first line after the comments that contains only numbers."""
+    """Index of the first row of numbers, at most one line after the comments; None if there is none."""
     row = re.compile(rf"\s*{NUMBER}(?:[\s,;]+{NUMBER})*[\s,;]*")
     start = _comments(text)
     return next((k for k in range(start, min(start + 2, len(text.lines))) if row.fullmatch(text.lines[k])), None)

@@ -44,7 +44,7 @@ def read(text: RecordText, choices: Choices) -> Reading:
 
 
 def _keys(text: RecordText) -> dict[str, int]:
-    """Header values by key."""
+    """Line indices of the header values, by key."""
     found: dict[str, int] = {}
     for index, line in enumerate(text.lines[:_LONGEST_HEADER]):
         key, colon, _ = line.partition(":")

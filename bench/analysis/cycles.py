@@ -47,7 +47,8 @@ class Cycle:
     `coefficients`, shape (1 + 2 H, m): mean, cosines and sines of the harmonics of phase = omega (sample index) / rate.
     `fundamental` holds the complex amplitudes c with signal = Re(c exp(-i phase)); `peak` is the largest magnitude of
     the fitted motion, including its mean; `noise` is the rms of the residual; shape (m,) each. `extreme`, shape (m,),
-    is the largest magnitude of the samples: the fit overshoots a motion that differs between the two ends of the cycle.
+    is the largest magnitude of the samples, for an unsteady motion, whose peak the fit overshoots because the motion
+    differs between the two ends of the cycle.
     """
 
     index: int

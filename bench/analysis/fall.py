@@ -26,8 +26,8 @@ class FallWatch:
     """Detector of a fallen block. Such a block deflects the frame permanently: the mean of u1 is k_C h1 sin(theta) /
     (k1 + k_C).
 
-    The mean is taken over the blocks that fill `PERIODS` of the frame's first mode, which suppresses the forced motion
-    and the motion in that mode; the threshold is half the offset at `FALLEN_TILT`.
+    The mean is taken over the last samples, at least `PERIODS` of the frame's first mode, which suppresses the forced
+    motion and the motion in that mode; the threshold is half the offset at `FALLEN_TILT`.
     """
 
     def __init__(self, specimen: Specimen, sample_rate: float) -> None:
@@ -43,7 +43,7 @@ class FallWatch:
         return self._threshold
 
     def fallen(self, signals: NDArray[np.float64]) -> bool:
-        """Whether the next block of signals, shape (n, n_signals), shows that the rocking block has fallen."""
+        """Process the next signals, shape (n, n_signals). Returns whether the rocking block has fallen."""
         if self._threshold == 0.0:
             return False
         u1 = signals[:, U1]

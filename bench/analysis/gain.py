@@ -25,7 +25,7 @@ scatter of 1.1 %.
 """
 
 ZERO_PLACES = 32
-"""Number of points of a cycle whose mean is the zero of its peak."""
+"""Number of points of a cycle at which a laser's readings are averaged to obtain the zero of the peak."""
 
 CHECK_PLACES = 64
 """Number of points of a cycle at which a laser's readings are evaluated to check its linearity."""

@@ -67,7 +67,7 @@ class SignalMap:
     def tare(self, values: NDArray[np.float64]) -> None:
         """Take the mean of channel values at rest, shape (n, n_channels), as the zero of every signal.
 
-        The zero of a signal without any value is that of its sensor.
+        A signal without any value at rest keeps the zero of its sensor.
         """
         raw = self._raw(values)
         valid = np.count_nonzero(np.isfinite(raw), axis=0)

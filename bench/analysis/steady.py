@@ -24,7 +24,7 @@ KIN_SHARE = 0.25
 @dataclass(frozen=True)
 class Steadiness:
     """Steadiness of a dwell. `spread`, of the cycles within a window, and `drift`, of the mean between the windows, are
-    relative to each signal's mean amplitude; each is the largest value of all signals.
+    relative to each signal's mean amplitude and in excess of its noise; each is the largest value of all signals.
 
     `repeats` is the number of cycles after which the motion repeats: 1 if it is steady, 2 to 6 for a subharmonic, 0 if
     it does not repeat.

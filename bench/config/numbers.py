@@ -23,7 +23,8 @@ from typing import Any, cast
 def converted(digits: str, typed: str, unit: str) -> float:
     """Convert the decimal number `digits` from the unit `typed` to the declared `unit` ("1" for a pure number).
 
-    Raises ValueError that names both units if the typed unit is unknown or has another dimension.
+    Raises ValueError, with a remedy, if the typed unit is unknown or has another dimension, if the declared unit allows
+    none, or if the value exceeds the range of a number.
     """
     if unit == "":
         raise ValueError(f"it must be a number without a unit: remove {typed!r}")

@@ -27,7 +27,7 @@ class KeptFile:
     remedy: str
 
     def write(self, path: Path, content: Mapping[str, Any]) -> None:
-        """Write a new file, SI units. Raises InvalidInput if `path` exists or cannot be written."""
+        """Write a new JSON file in SI units. Raises InvalidInput if `path` exists or cannot be written."""
         head = dict(zip(_HEAD, (self.format, self.version, software()["rocking-bench"]), strict=True))
         text = json.dumps({**head, **content}, indent=1, ensure_ascii=False, allow_nan=False)
         try:
@@ -56,7 +56,7 @@ class KeptFile:
             allowed = f'it is not a {self.item}: its "format" is not "{self.format}"; {self.remedy}'
             raise InvalidInput(self.item, str(path), allowed)
         if (said := content.get("format_version")) != self.version:
-            allowed = f"this program reads format version {self.version}, the file has {said!r}: update this program"
+            allowed = f"the program reads format version {self.version}, but the file has {said!r}: update this program"
             raise InvalidInput(self.item, str(path), allowed)
         return {key: value for key, value in content.items() if key not in _HEAD}
 
@@ -67,7 +67,7 @@ SPECIMEN_FILE = KeptFile(
 
 
 def write_specimen(path: Path, identified: Identified) -> None:
-    """Write a new file: JSON, SI units. Raises InvalidInput if `path` exists or cannot be written."""
+    """Write a new JSON file in SI units. Raises InvalidInput if `path` exists or cannot be written."""
     plain = identified.model_dump(mode="json")
     findings = [_with_unit(finding) for finding in plain["findings"]]
     SPECIMEN_FILE.write(path, {"findings": findings, "correlations": plain["correlations"]})
@@ -134,7 +134,7 @@ CALIBRATION_FILE = KeptFile(
 
 
 def write_calibration(path: Path, calibration: LaserCalibration) -> None:
-    """Write a new file: JSON, SI units. Raises InvalidInput if `path` exists or cannot be written."""
+    """Write a new JSON file in SI units. Raises InvalidInput if `path` exists or cannot be written."""
     CALIBRATION_FILE.write(path, calibration.model_dump(mode="json"))
 
 

@@ -29,7 +29,7 @@ class _Watched(NamedTuple):
 def unusual(parameters: Parameters, prefix: str = "") -> Iterator[str]:
     """A notice for each key with a value outside its usual range, naming value and range; keys begin with `prefix`.
 
-    Zero, where allowed, causes no notice. In a list, the first such value is named.
+    Zero, where allowed, causes no notice. In a list, the first unusual value is named.
     """
     values, groups = _watched(type(parameters))
     for watched in values:

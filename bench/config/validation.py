@@ -189,7 +189,7 @@ def _refusal(model: type[Parameters], detail: Any, named: Callable[[Path], str])
     if isinstance(raised, InvalidInput):
         return InvalidInput(named((*path, raised.item)), raised.value, raised.allowed)
     if raised is not None:
-        return InvalidInput(named(path) or "the whole", value, str(raised))
+        return InvalidInput(named(path) or "parameters", value, str(raised))
     if detail["type"] == "extra_forbidden":
         return InvalidInput(named(path), value, f"there is no such key{_suggestion(model, path)}")
     if detail["type"] == "missing":

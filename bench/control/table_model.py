@@ -44,8 +44,8 @@ LONGEST_AGE = timedelta(hours=12)
 class TableModel(Parameters):
     """Table acceleration per drive [m/s2/V] at ascending frequencies; all arrays have shape (n_lines,).
 
-    The response covers everything between a drive sample and a channel's sample: hold, amplifier, table, specimen,
-    filter card. Convention exp(+i omega t).
+    The response covers everything between a drive sample and a channel's sample: the hold of the output converter,
+    amplifier, table, specimen and filter card. Convention exp(+i omega t).
     """
 
     date: AwareDatetime = quantity(..., "", "date of the identification")

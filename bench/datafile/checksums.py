@@ -1,4 +1,4 @@
-"""Checksums of datasets, computed for fixed datasets at the start of the run and for growing datasets at its end.
+"""Checksums of datasets, computed for fixed datasets when the file is created and for growing ones when it is closed.
 
 The checksum of a dataset is the SHA-256 of its values' bytes, uncompressed and in order, in hexadecimal digits.
 Checksums of attributes cover names and values as JSON, so that a later change to a conversion is detected. Checksums of

@@ -100,7 +100,7 @@ _ROWS_AT_ONCE = 2**18
 
 
 def drop_channels(entry: hdf5.Group, lost: dict[str, str]) -> None:
-    """Remove channels without a readable conversion of their counts; the reason is added to `lost`."""
+    """Remove the counts of every channel whose conversion cannot be read, and add the reason to `lost`."""
     instrument = hdf5.group(entry, "instrument")
     for name in hdf5.names(instrument):
         if hdf5.has(instrument, f"{name}/counts"):
@@ -128,9 +128,9 @@ def renew_drive(entry: hdf5.Group) -> None:
 def renew_tables(
     entry: hdf5.Group, lost: Iterable[str], own: Iterable[str], lines: Iterable[Mapping[str, Any]]
 ) -> None:
-    """Empty every table that has a dataset among the `lost` paths; its rows may be recovered from the `lines` of the
-    journal. The columns of the tables of the protocol's `own` events are in these lines; without them the table is
-    removed.
+    """Replace every table that has a dataset among the `lost` paths by an empty one; its rows may be recovered from the
+    `lines` of the journal. The columns of the tables of the protocol's `own` events are in these lines; without them
+    the table is removed.
     """
     gone = tuple(lost)
     declared = {line["table"]: line["fields"] for line in lines if "table" in line and "fields" in line}

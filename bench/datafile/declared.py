@@ -19,7 +19,7 @@ from bench.events import Event
 
 BLOCKS = (
     Field("row", Kind.WHOLE, "1", "row of the samples at which the block begins"),
-    Field("run", Kind.WHOLE, "1", "number of armings of the rig"),
+    Field("run", Kind.WHOLE, "1", "number of the run; each arming of the rig begins one"),
     Field("first", Kind.WHOLE, "1", "index of the block's first sample, counted from 0 in each run"),
     Field("time", Kind.REAL, "s", "bench time after reading the block"),
 )
@@ -33,7 +33,7 @@ EVENTS = (
 RAW_VALUES = tuple(
     Field(name, Kind.WHOLE, unit, description, packed=True)
     for name, unit, description in (
-        ("run", "1", "number of armings of the rig"),
+        ("run", "1", "number of the run; each arming of the rig begins one"),
         ("sensor", "1", "number of the sensor's channel, in the order of the rig, from 0"),
         ("index", "1", "number of the measurement, counted by the sensor; it jumps where values were lost"),
         ("time", "us", "time of the measurement by the sensor's clock"),

@@ -66,7 +66,7 @@ def _original(source: hdf5.Group, path: Path) -> str:
 
 
 def overview(path: Path) -> dict[str, Any]:
-    """Read the metadata of a file, and the number of its samples.
+    """Overview of a campaign or re-analysis file as JSON content; sample values are not included.
 
     Raises InvalidInput for a file of another kind, and DataFileError for a file that cannot be read.
     """

@@ -63,7 +63,7 @@ class Skeleton:
 
     @property
     def own(self) -> dict[str, tuple[Field, ...]]:
-        """Fields of the tables of these events, by path below /entry."""
+        """Fields of the tables of `events`, by path below /entry."""
         return {table.path: table.fields for table in event_tables(self.events).values()}
 
     def check(self) -> None:

@@ -37,7 +37,7 @@ def is_within(stored: hdf5.Dataset, size: int) -> bool:
 
 
 def check_whole(entry: hdf5.Group, counted: Mapping[str, int], size: int) -> None:
-    """Read all metadata, and locate the rows that the file states to be complete.
+    """Read all metadata, and check that the rows counted as complete lie within the file.
 
     Raises HDF5's exceptions for damage, and DataFileError for rows beyond `size` bytes.
     """

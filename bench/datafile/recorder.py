@@ -133,7 +133,7 @@ class Recorder:
             self._enqueue(event)
 
     def stores(self, event: type[Event]) -> bool:
-        """Whether the columns of the event are stored, and not only its line in the journal."""
+        """Whether the event is stored with its columns, if it has any, and not only as a line of the journal."""
         return self._writer.has_table(event)
 
     def sync(self) -> None:

@@ -112,7 +112,7 @@ class Recovery:
 
 
 def write_ends(record: DataFile, path: Path, entry: hdf5.Group, lengths: Mapping[str, int], loss: str) -> None:
-    """Write the values that are set at the end of a run: those of the original, or replacements with the reason.
+    """Write the values that are set when a campaign ends: those of the original, or replacements with the reason.
 
     `lengths` are the numbers of rows of every part; `loss` describes the missing data.
     """
@@ -231,7 +231,7 @@ def _is_renewed(path: str) -> bool:
 
 
 def _counted(record: DataFile, judged: Integrity) -> Mapping[str, int]:
-    """For every part, the number of rows written to the disk or, if that is unknown, the length of the datasets."""
+    """Number of rows of every part written to the disk or, if that is unknown, the length of its longest dataset."""
     if "/entry/complete" not in judged.failing:
         return record.counted
     lengths = dict.fromkeys(record.counted, 0)

@@ -4,7 +4,7 @@ Every error of a measured signal shifts the values by the gain of the linearised
 in how the error is described:
 
 - noise: from the spectrum of the residual (Welch), because neighbouring samples are correlated (laser resolution,
-filters); the noise of each quantity is that at the frequencies which determine it;
+filters); each quantity is affected only by the noise at the frequencies that determine it;
 - table: the noise of the table's sensor, filtered by the frame's response while a mode rings; the
 density of this noise is measured at rest before the motion;
 - clock: the lasers' clocks run freely, so that the delay of a laser wanders by up to one of its measuring periods;
