@@ -18,7 +18,7 @@ _STILL_VELOCITY = 2.0e-4
 _STILL_DISPLACEMENT = 2.0e-4
 """Displacement of the table from mid stroke [m] below which the table is considered at rest."""
 _LONGEST_WAIT = 300.0
-"""Longest wait for rest [s]; a block held by its catch is not awaited."""
+"""Longest wait for rest [s]; a block held by its catch counts as at rest."""
 _WARM_UP = 0.5
 """Settling time of filters and lasers at rest before the sample clock starts [s]."""
 

@@ -24,7 +24,7 @@ class Channel:
 
     `value = offset + scale counts + higher[0] counts^2 + ...` in `unit`.
 
-    `quantity` is the measured quantity: "displacement", "acceleration" or "voltage". `valid` is the inclusive range of
+    `quantity` is the measured quantity, such as "displacement" or "acceleration". `valid` is the inclusive range of
     counts of valid measurements: outside it the converter is saturated or the sensor signals an error, and the sample
     becomes NaN. `faults` gives the meaning of individual counts outside it. The `delay` [s] of the channel, with
     standard uncertainty `delay_uncertainty` [s], has already been removed from its samples. `higher` are the small

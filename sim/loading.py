@@ -41,7 +41,7 @@ for name in sys.argv[2:]:
 def load_model(
     report: Callable[[str, int, int], None] = lambda _phase, _done, _all: None, modules: Mapping[str, int] = MODEL
 ) -> None:
-    """Import the `modules`. `report` is called with a description, the shares of the time that have passed and all."""
+    """Import the `modules`. `report` is called with a description, the sum of the shares completed, and that of all."""
     if all(f"sim.kernel.{name}" in sys.modules for name in modules):
         return
     report("loading the model", 0, 0)
@@ -63,8 +63,10 @@ def load_model(
 
 @contextmanager
 def helped(names: Sequence[str]) -> Generator[Mapping[str, Event], None, None]:
-    """Context manager that runs the helper for the modules `names`: an event for each, set once it need not be awaited.
-    Empty where a helper would not save time or cannot be started.
+    """Context manager that runs the helper for the modules `names`, and provides an event for each module, which is set
+    when the module has been compiled or the helper has ended.
+
+    There are no events where a helper would not save time or cannot be started.
     """
     if not names or not sys.executable or (os.cpu_count() or 1) < 2:
         yield {}

@@ -56,7 +56,7 @@ class Outcome(StrEnum):
 class Reached:
     """Outcome of a start-up.
 
-    `time` [s], from the beginning, is that at which the block overturned or the outcome was decided. `side` is the
+    `time` [s], from the beginning, is when the block overturned or the outcome was decided. `side` is the
     corner about which it overturned. `peaks` are those of the last 20 periods of the drive; None if the block toppled
     or the run failed.
     """

@@ -51,7 +51,7 @@ NEAR = 0.3
 
 MOST_ITERATIONS = 10
 SMALLEST_ADVANCE = 1e-3
-"""Maximum number of Newton iterations, and limits on the steps of `follow` as fractions of the path."""
+"""Maximum number of Newton iterations, and lower limit on the steps of `follow` as a fraction of the path."""
 
 MOST_KNOWN = 5
 """Number of points used by an extrapolation; more would amplify the rounding errors of the Jacobians."""

@@ -67,7 +67,7 @@ class VirtualBenchParameters(Parameters):
 
 @dataclass(frozen=True)
 class Truth:
-    """True motion at the ticks of the last block, as arrays of shape (n,); for tests only."""
+    """True motion at the ticks of the last block, which no instrument measures exactly, as arrays of shape (n,)."""
 
     x: Array
     v: Array

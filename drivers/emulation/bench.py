@@ -53,7 +53,7 @@ class EmulatedBench:
         self._half_stroke = parameters.shaker.half_stroke
         self._subscriber: Callable[[NDArray[np.float64]], None] | None = None
         self.lock = threading.RLock()
-        """Guards the bench; held while subscribers receive the table's motion."""
+        """Guards the bench; held while the subscriber receives the table's motion."""
         # load the compiled code and run one sample before the clock starts
         self._bench.run(np.zeros(1))
         self._started = time.monotonic()
@@ -128,8 +128,8 @@ class EmulatedBench:
             self._subscriber = subscriber
 
     def connect_laser(self, storey: int, live: Callable[[], bool]) -> None:
-        """Switch the analogue output of the laser on storey 1 or 2; while `live()` is false, it
-        supplies the error current.
+        """Let `live` state whether the analogue output of the laser on storey 1 or 2 follows its target; while it is
+        false, the output supplies the error current.
         """
         with self.lock:
             self._outputs[1 + storey] = live
@@ -139,8 +139,8 @@ class EmulatedBench:
         return Storey(self, storey)
 
     def target_displacement(self, storey: int, times: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Displacement [m] of the target of a storey's laser at monotonic times [s], with cubic interpolation between
-        ticks.
+        """Displacement [m] of the target of a storey's laser at times of the machine's monotonic clock [s], with cubic
+        interpolation between ticks.
         """
         ticks = (times - self._started) * self._rate
         with self.lock:

@@ -121,7 +121,7 @@ class Laboratory:
         self.close()
 
     def _handlers(self) -> dict[str, Any]:
-        """Handlers of remote commands: operator tasks, faults, and the true motion, which no client can measure."""
+        """Handlers of remote commands: operator tasks, faults, and true values that no client can measure."""
         return {
             "handwork": self._perform,
             "laser": self._laser,
@@ -134,7 +134,7 @@ class Laboratory:
         self.bench.perform(OperatorTask(arguments["work"]), arguments.get("amount"))
 
     def _switch_lasers(self, edges: NDArray[np.float64]) -> None:
-        """The counter is wired to the inputs that switch the lasers on: high is open."""
+        """Switch the lasers at the edges of the counter, which is wired to their on/off inputs: high opens these."""
         for laser in self.lasers:
             laser.switch(edges)
 

@@ -47,7 +47,7 @@ _ENDS: tuple[int, ...] = (1, 2)
 
 
 class SafetyChain:
-    """Controls the enable input of `bench`; the heartbeat relay opens `heartbeat` seconds after the last edge.
+    """Controls the enable input of `bench`; the heartbeat relay opens `heartbeat` seconds after the last rising edge.
 
     Contacts and faults may be read and set from any thread.
     """

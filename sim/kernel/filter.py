@@ -1,5 +1,5 @@
-"""Recursive filters: a cascade of second-order sections for several channels, and an exponential mean; the converter
-behind them.
+"""Recursive filters (a cascade of second-order sections for several channels, and an exponential mean), and the
+converter that digitises the filtered voltages.
 """
 
 import numpy as np
@@ -44,8 +44,8 @@ def digitise(
     highest: int,
     counts: NDArray[np.int16],
 ) -> None:
-    """Write the counts of `volts`, shape (channels, n), to `counts`, same shape: rounded to even, between the `lowest`
-    and the `highest`.
+    """Write the counts of `volts`, shape (channels, n), to `counts`, same shape: rounded, halves to even, and limited
+    to the range from `lowest` to `highest`.
 
     normal : shape (n, channels), standard normal numbers of the input noise.
     noise, lsb : standard deviation of the noise [V] and voltage of one count [V].

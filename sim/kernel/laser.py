@@ -18,7 +18,7 @@ its periods in the range [1] and their phase [rad], number of steps of the outpu
 
 @compiled("float64(float64, float64[::1])")
 def output(displacement: float, constants: NDArray[np.float64]) -> float:
-    """Voltage [V] across the load at a displacement [m] from mid range: 4 to 20 mA with a reserve of 1 % at either end,
+    """Voltage [V] across the load at a displacement [m] from mid range: 4 to 20 mA with a reserve of 1 % at both ends,
     and the error current beyond it.
     """
     place = displacement / constants[RANGE]

@@ -23,9 +23,9 @@ Analog Input Modules", "Scanned Modules"; M and X Series alike)."""
 class DeltaSigma:
     """A delta-sigma converter: master timebase [1/s], and input delay of `samples` samples and `seconds`.
 
-    The delay is caused by the digital filter (NI knowledge base, kA00Z0000004A0YSAU, "Calculate the Input Delay"). The
-    driver does not remove it: a client must account for the differences (NI-DAQmx help, "cdaqmultidevice"). `readable`:
-    whether the device has the properties AI.FilterDelay and AI.RemoveFilterDelay.
+    The delay is caused by the digital filter (NI knowledge base, kA00Z0000004A0YSAU, "Calculate the Input Delay").
+    `readable`: whether the device has the properties AI.FilterDelay and AI.RemoveFilterDelay. Without them, the driver
+    does not remove the delay: a client must account for the differences (NI-DAQmx help, "cdaqmultidevice").
     """
 
     timebase: float

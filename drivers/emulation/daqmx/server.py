@@ -257,7 +257,7 @@ class DaqServer:
         self._faults.fail_next(call, code)
 
     def stall(self, seconds: float) -> None:
-        """Delay all replies, like a frozen machine; the devices continue."""
+        """Stall all calls for `seconds`, like a frozen machine; the devices continue."""
         self._faults.stall(seconds)
 
     def lose_network(self) -> None:

@@ -1,4 +1,4 @@
-"""Devices of National Instruments by name, with the figures and rules of NI's documents.
+"""National Instruments devices by name, with specifications and rules from NI's documents.
 
 The tables are taken from the documents alone, independently of the assumptions of this program's drivers.
 """

@@ -169,7 +169,7 @@ class Actions:
         return self.done(request)
 
     def _measuring_settings(self, request: Request) -> list[str]:
-        """Handler for stored measurement settings, which share one slot, whatever its name."""
+        """Store or restore the measurement settings; all names share one slot."""
         self.require_professional()
         sensor = self._sensor
         match request.parameters:

@@ -61,7 +61,7 @@ def words(blocks: NDArray[np.int64]) -> NDArray[np.uint8]:
 Array = NDArray[np.float64]
 
 _RESERVE = 0.01
-"""Reserve beyond either end of the measuring range that is still measured, as a fraction of the range."""
+"""Reserve beyond each end of the measuring range, within which distances are measured, as a fraction of the range."""
 
 
 class Optics:

@@ -85,7 +85,7 @@ class EmulatedLaser:
     [1/s], `password` and `boot_time` [s] differ between versions of the sensor or are not documented. Every method may
     be called from any thread. With `network`, the port is a socket, to which baud rates do not apply.
 
-    Raises DeviceNotFound for another port on Windows, which has no pseudo-terminals.
+    Raises DeviceNotFound on Windows, which has no pseudo-terminals, unless `network` is set.
     """
 
     def __init__(
@@ -145,8 +145,8 @@ class EmulatedLaser:
         return self._terminal.dropped
 
     def take_lateness(self) -> float:
-        """Longest delay [s] since the last call with which this computer has sent a value, in addition to that of a
-        sensor.
+        """Longest delay [s], in addition to that of a real sensor, with which this computer has sent a value since the
+        last call.
         """
         with self._lock:
             lateness, self._lateness = self._lateness, 0.0
@@ -207,7 +207,9 @@ class EmulatedLaser:
             self._sensor.beam = True
 
     def switch(self, times: NDArray[np.float64]) -> None:
-        """Open and close the input that switches the laser on, in turn, at ascending host times [s]; none: closed."""
+        """Open and close the input that switches the laser on, in turn, at ascending host times [s]; without times, it
+        remains closed.
+        """
         # without the lock: the device calls this while it holds locks for which the thread of the line may wait
         self._sensor.switching = times
 
