@@ -50,7 +50,7 @@ PASSES = 3
 """Number of fits, each weighted by the residual of the previous one."""
 
 SMALLEST = 1e-9
-"""Smallest scatter of a coefficient, relative to the norm of the series, in place of that of a series without noise."""
+"""Smallest scatter assumed for a coefficient, relative to the norm of the series, so that its weight stays finite."""
 
 
 @dataclass(frozen=True)

@@ -76,8 +76,9 @@ class Recorder:
     `chunk_time` is the duration of a chunk of samples [s].
 
     `metadata` is stored as strings under /entry/metadata, `tables` (such as {"prediction": ...}) under /entry. `events`
-    are those of the protocol whose tables the file needs; any other event is stored as a line of the journal. Raises
-    InvalidInput, without creating a file, if `path` exists or cannot be created, or if a name or table is invalid.
+    are those of the protocol whose tables the file needs; any other of its events is stored only as a line of the
+    journal. Raises InvalidInput, without creating a file, if `path` exists or cannot be created, or if a name or table
+    is invalid.
     """
 
     def __init__(
