@@ -37,7 +37,7 @@ class Site:
 
     `inputs` are the terminals of displacement, acceleration and lasers; `contacts` are the digital inputs in the order
     of the safety chain's INPUTS, none on a device without digital inputs. `counter` switches the lasers; None if there
-    is none. `range` is the largest voltage of all inputs [V].
+    is none. `range` is the largest voltage that all inputs can measure [V].
     """
 
     devices: tuple[DeviceModel, ...]

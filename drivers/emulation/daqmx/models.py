@@ -1,4 +1,4 @@
-"""Two sets of devices, with specifications from the data sheets."""
+"""Two sets of devices, with specifications from the data sheets; lists of names; catalogue of a server's devices."""
 
 import re
 from collections.abc import Sequence
@@ -77,7 +77,7 @@ def flattened(names: Sequence[str]) -> str:
 
 
 def unflattened(names: str) -> tuple[str, ...]:
-    """The individual names in a list such as "Dev1/ai0:3, Dev1/ai6"; ranges may run downwards."""
+    """The individual names in a list such as "Dev1/ai0:3, Dev1/ai6"; ranges may be descending."""
     found: list[str] = []
     for part in filter(None, (part.strip() for part in names.split(","))):
         if (given := _RANGE.match(part)) is None:

@@ -16,7 +16,7 @@ _SOON = 5.0e-5
 
 
 def deadline_after(timeout: float) -> float:
-    """Deadline [monotonic s] of a call with this DAQmx time-out; -1: never."""
+    """Deadline [s of the monotonic clock] of a call with this DAQmx time-out [s]; infinite for -1."""
     return float("inf") if timeout < 0.0 else time.monotonic() + timeout
 
 
@@ -51,7 +51,7 @@ class SampleClock:
         return abs(self.divider * self.rate - tick_rate) <= _SAME * tick_rate
 
     def ticks(self, first: int, samples: int) -> int:
-        """The tick of each of the sample numbers `samples` if sample 0 is at tick `first`."""
+        """The tick of sample number `samples` if sample 0 is at tick `first`."""
         return first + ceil(samples * self.divider / (1.0 + self.error))
 
     def passed(self, first: int, tick: int) -> int:

@@ -18,8 +18,8 @@ Expire = Callable[[Sequence[DeviceModel], dict[str, bool], dict[str, float]], No
 class Watchdog:
     """The `Job` of a watchdog. The watchdog of a simulated device, or one with a time-out of -1, never expires.
 
-    `parts` are the device and its modules; `expire` sets their outputs to the given levels and volts, `release` permits
-    writes to the lines again.
+    `parts` are the device and its modules; `expire` sets their outputs to the given levels and volts. Clearing the
+    expiry permits writes to `lines` again.
     """
 
     awaited: str | None = None

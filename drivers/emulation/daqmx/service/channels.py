@@ -86,7 +86,7 @@ class ChannelService(Service):
         task, driver = self._task(request), self._driver
         task.require_stopped()
         if task.job is not None or (request.idle_state_raw or request.idle_state) != Level.LOW.value:
-            raise NotEmulated("several counter outputs in one task, or one that is high at rest")
+            raise NotEmulated("a task with several counter outputs, or with one that is high at rest,")
         device, k = driver.catalogue.counter(request.counter)
         name = device.counter_names[k]
         wired = driver.wires.counters.get(name)

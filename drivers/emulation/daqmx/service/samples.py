@@ -213,7 +213,7 @@ class WritingService(Service):
             if job.clock is None:
                 self._require_started(task, auto_start=auto_start)
                 if volts.shape[0] != 1:
-                    raise NotEmulated("several values one after the other without a sample clock")
+                    raise NotEmulated("a write of several values without a sample clock")
                 job.put(volts[0])
                 return 1
             self._driver.reserve(task)

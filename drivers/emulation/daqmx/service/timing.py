@@ -43,7 +43,7 @@ class TimingService(Service):
             raise NotEmulated("a clock for a finite number of samples")
         own = request.source in ("", "OnboardClock")
         if not own and isinstance(job, AnalogInput):
-            raise NotEmulated("inputs on an external sample clock")
+            raise NotEmulated("an input task on an external sample clock")
         error = self._driver.output_clock_error if own and isinstance(job, AnalogOutput) else 0.0
         tick_rate = self._driver.plant.tick_rate
         job.source = None if own else request.source
