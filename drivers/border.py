@@ -187,7 +187,7 @@ class CheckedRig:
 
     def _checked_channels(self, given: Any) -> tuple[Channel, ...]:
         if type(given) is not tuple or not 0 < len(cast("tuple[Any, ...]", given)) <= MOST_CHANNELS:
-            self._refuse(f"has channels {given!a:.80}: they must be a tuple of 1 to {MOST_CHANNELS}")
+            self._refuse(f"has channels {given!a:.80}: they must be a tuple of 1 to {MOST_CHANNELS} channels")
         channels = cast("tuple[Channel, ...]", given)
         known: set[str] = set()
         for number, channel in enumerate(channels):

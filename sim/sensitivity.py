@@ -3,8 +3,8 @@
 The rocking orbit is a fixed point x = F(x, p) of the return map. By the implicit function theorem,
 dx/dp = (I - F_x)^-1 F_p, where F_x is the matrix whose eigenvalues are the Floquet multipliers. A peak is a stationary
 value u(t*), so that its derivative is that of u at a fixed t* (envelope theorem): dP/dp = u_x dx/dp + u_p. The
-derivative of alpha = P / P_bare then follows by the quotient rule. Finite differences of the larger of both peaks are
-unsuitable: the excursions to the two sides are so similar that a small step changes which one is larger.
+derivative of alpha = P / P_bare then follows by the quotient rule. Finite differences of P itself are unsuitable: the
+excursions to the two sides are so similar that a small step changes which one is larger.
 """
 
 from collections.abc import Mapping

@@ -55,7 +55,7 @@ def site_of(device: Device, modules: Sequence[str] = ()) -> Site:
     """The wiring of a device, or of a chassis with `modules`.
 
     With two input modules the accelerometer is on the first and everything else on the second. Raises InvalidInput for
-    a chassis without inputs, output or relays.
+    a chassis without inputs, output or relays, and for modules in a fixed set of devices.
     """
     if device in ("usb", "crio"):
         if modules:

@@ -29,7 +29,8 @@ _HEAD = struct.Struct("<dI")
 _PACE = 0.0025
 """Pause between two reads of the line [s]; the cost of a read does not depend on the number of bytes.
 
-More frequent reads coincide with an arrival more often, which improves the identification of the sensor's clock.
+The more frequent the reads, the closer some of them follow an arrival, which improves the estimate of the sensor's
+clock.
 """
 
 

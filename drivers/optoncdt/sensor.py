@@ -40,7 +40,8 @@ def require_sensor(
 
 
 def configure(dialogue: Dialogue, rate: float, baud: int) -> tuple[Layout, bool]:
-    """Configure all settings for measurements at `rate` [1/s], with the output switched off.
+    """Configure all settings for measurements at `rate` [1/s], with the output switched off. Returns the layout of a
+    measurement, and whether the sensor has confirmed its rate.
 
     Raises InvalidInput for a rate that line or sensor does not support, RigError if the sensor rejects a setting.
     """

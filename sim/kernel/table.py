@@ -34,7 +34,7 @@ from sim.kernel.plant import (
 )
 
 COLUMNS = 9
-"""Columns of the samples: the state, then the table's mean acceleration over the previous tick."""
+"""Number of columns of the samples: the state, then the table's mean acceleration over the previous tick."""
 
 _NONE, _IMPACT, _CATCH, _UPLIFT = 0, 1, 2, 3
 _REST_ANGLE = 1.0e-7

@@ -154,7 +154,7 @@ class Dialogue:
         return said
 
     def _answer(self, line: bytes, now: float) -> bytes:
-        """The answer to one command with its prompt; empty if it is pending."""
+        """The answer to one command with its prompt; empty while the answer is pending."""
         text = line.decode("ascii", "replace").strip()
         try:
             if len(text) > _LONGEST:
