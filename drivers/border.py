@@ -18,6 +18,8 @@ from drivers.rig import Alignment, Block, Channel, OperatorTask, RawValues, Rig
 from sim.errors import RockbenchError
 
 MOST_CHANNELS = 256
+LOWEST_RATE = 1.0
+"""Smallest sample rate [1/s]; with a tiny one, a replay would never end."""
 HIGHEST_RATE = 1e6
 """Largest sample rate [1/s]; above it, this program's buffers would hold less than a second."""
 LONGEST_LEAD = 10.0
@@ -80,7 +82,7 @@ class CheckedRig:
         if missing:
             self._refuse(f"returned {type(self._rig).__name__}, which is not a rig: it has no {', '.join(missing)}")
         self.channels = self._checked_channels(self._given("channels"))
-        self.sample_rate = self._number("sample_rate", HIGHEST_RATE)
+        self.sample_rate = self._number("sample_rate", HIGHEST_RATE, LOWEST_RATE)
         self.drive_range = self._number("drive_range", HIGHEST_VOLTAGE)
         self.lead = self._checked_lead(self._given("lead"), self.sample_rate)
         self.description = self._checked_description(self._given("description"))
@@ -173,10 +175,11 @@ class CheckedRig:
             if clock.fault:
                 raise BackendFault(self.backend, f"provides no time: {clock.fault}")
 
-    def _number(self, name: str, highest: float) -> float:
+    def _number(self, name: str, highest: float, lowest: float = 0.0) -> float:
         value, item = self._given(name), name.replace("_", " ")
-        if not is_number(value) or not 0.0 < value <= highest:
-            self._refuse(f"has a {item} of {value!a}: it must be a number above 0 and at most {highest:g}")
+        if not is_number(value) or not (lowest <= value <= highest and value > 0.0):
+            least = f"at least {lowest:g}" if lowest else "above 0"
+            self._refuse(f"has a {item} of {value!a}: it must be a number {least} and at most {highest:g}")
         return float(value)
 
     def _checked_lead(self, lead: object, rate: float) -> int:

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from math import inf
 from typing import Any
 
 import numpy as np
@@ -13,6 +12,7 @@ from bench.datafile import hdf5
 from bench.datafile.hdf5_reading import DataFileError, reading
 from bench.datafile.opening import counts
 from bench.datafile.samples import read_channels
+from drivers.border import HIGHEST_RATE, LOWEST_RATE
 from drivers.rig import Channel, Counts, RawValues
 from sim.errors import InvalidInput
 
@@ -88,8 +88,9 @@ class SampleReader:
         rate = hdf5.read(hdf5.dataset(self._instrument, "sample_rate"))
         with reading(f"{self._instrument.name}/sample_rate"):
             rate = float(rate)
-        if not 0.0 < rate < inf:
-            raise DataFileError(f"{self._instrument.name}/sample_rate is {rate}: the file is damaged")
+        if not LOWEST_RATE <= rate <= HIGHEST_RATE:
+            allowed = f"it must be from {LOWEST_RATE:g} to {HIGHEST_RATE:g} 1/s"
+            raise DataFileError(f"{self._instrument.name}/sample_rate is {rate:g}, but {allowed}: the file is damaged")
         return rate
 
     @cached_property

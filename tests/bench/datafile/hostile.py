@@ -90,7 +90,7 @@ def _committed_type(parent: Any, name: str) -> None:
 
 
 def _cycle(parent: Any, name: str) -> None:
-    parent[name] = parent.file["entry"]
+    parent[name] = parent.file.get("entry", parent)
 
 
 def _external_self(parent: Any, name: str) -> None:
@@ -145,7 +145,7 @@ INSTEAD: dict[str, Callable[[Any, str], None]] = {
     "nothing of a type": _values(np.zeros(0)),
     "complex numbers": _values(np.zeros(5, dtype=complex)),
     "references": lambda parent, name: _values(
-        np.array([parent.file["entry"].ref] * 2, dtype=object), dtype=h5py.ref_dtype
+        np.array([parent.file.get("entry", parent).ref] * 2, dtype=object), dtype=h5py.ref_dtype
     )(parent, name),
 }
 
