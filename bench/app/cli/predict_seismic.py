@@ -152,8 +152,8 @@ def _band_curve(curves: Sequence[SeismicCurve], k: int) -> BandCurve:
 
 
 def _extremes(lines: "Sequence[tuple[NDArray[Any], NDArray[Any], NDArray[Any]]]", unit: str) -> Table:
-    """For each line (x, alpha_2, toppled): number of toppled blocks, and the least and the largest gain with their
-    positions.
+    """For each line (x, alpha_2, toppled): number of points, number of those at which the block toppled, and the least
+    and the greatest gain with the x at which each occurs, in `unit`.
     """
     rows: list[list[float]] = []
     for x, alpha, toppled in lines:

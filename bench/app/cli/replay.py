@@ -108,7 +108,7 @@ def _counted(count: int, plural: str) -> str:
 
 
 def _text(replayed: "Replayed", table: str) -> str:
-    lines = [table.rstrip(), "", f"The replay was {replayed.status}: {replayed.reason}"]
+    lines = [table.rstrip(), "", f"Replay {replayed.status}: {replayed.reason}"]
     if replayed.ended is not None:
         lines.append(f"The recording is incomplete: {replayed.ended}")
     lines += [

@@ -256,7 +256,7 @@ def _print_result(result: "SessionResult", out: Path, as_json: bool, interrupted
     if result.status in GOOD:
         # a request to end that arrived after the end has no effect
         return 0 if error is None else 1
-    print_error(f"the run was {result.status}: {result.reason}")
+    print_error(f"run {result.status}: {result.reason}")
     return interrupted or (130 if result.interrupted else 1)
 
 

@@ -43,7 +43,7 @@ STOP_AGAIN = "STOP\nagain: CUT"
 STOP_BY_MOUSE = "STOP\nby mouse"
 KEY_NEEDS_FOCUS = "F12 works only while this window has the focus: click on it."
 STOP_TIP = (
-    "Ramps the output to zero fast and ends the run (F12, from anywhere). If pressed again after "
+    "Ramps the output quickly to zero and ends the run (F12 while this window has the focus). If pressed again after "
     "{after:g} s or more, cuts the enable line."
 )
 LATCHED = "STOP was pressed: clear it first"
@@ -208,7 +208,7 @@ EXPORT_TIP = "Runs `rockbench export` on the selected file, into a new folder ne
 MAKING, MADE, NOT_MADE = "Creating {path} …", "Created: {path}", "No file was written. {text}"
 OPEN_MADE = "Open"
 RESULTS_EMPTY = "No file is open. The results of a run appear here when it has ended."
-ENDED = "The run was {status}: {reason}. Results are in {out}."
+ENDED = "Run {status}: {reason}. Results are in {out}."
 REFUSED = "Nothing was started. {text}"
 FAILED_WORD = "FAILED"
 FAILED = (
@@ -296,7 +296,7 @@ QUEUE_IDLE, QUEUE_GOING, QUEUE_LAST = "{n} waiting.", "Running; {n} waiting.", "
 QUEUE_CHECKING = "Checking the plan of test {number}; {n} waiting."
 QUEUE_PAUSED = "▲ Paused: {why} {n} waiting."
 QUEUE_STOPPED = "STOP was pressed: use Clear STOP first."
-QUEUE_ENDED = "test {number} was {status}."
+QUEUE_ENDED = 'the status of test {number} is "{status}".'
 QUEUE_REFUSED = "the plan of test {number} was refused."
 QUEUE_FILE = "Saved in {path}; `rockbench queue` runs the same file."
 QUEUE_UNKEPT = "Not saved: the queue is lost when this window closes."

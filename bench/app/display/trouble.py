@@ -10,9 +10,9 @@ QUIET = ("completed", "stopped")
 """Endings that require no action."""
 
 
-RUN_ENDED = "The run was {status}: {reason}."
+RUN_ENDED = "Run {status}: {reason}."
 DID = {
-    "aborted": "The drive was ramped to zero fast, and the rig was stopped.",
+    "aborted": "The drive was ramped quickly to zero, and the rig was stopped.",
     "halted": "The enable line was cut at once, without a ramp.",
     "failed": "The output was ramped to zero, or cut if the rig no longer responded.",
 }

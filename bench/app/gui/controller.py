@@ -177,8 +177,8 @@ class Controller(QObject):
         self.changed.emit()
 
     def press_stop(self) -> None:
-        """Handle a press of STOP, which latches: the first press ramps the output to zero fast; another one, at least
-        `DELIBERATE` later, cuts the enable line.
+        """Handle a press of STOP, which latches: the first press ramps the output quickly to zero; another one, at
+        least `DELIBERATE` later, cuts the enable line.
         """
         first = not self.latched
         if first:

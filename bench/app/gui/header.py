@@ -88,9 +88,7 @@ class StopFilter(QObject):
 
 
 HEIGHT, LOW = 96, 72
-"""Side of the lamp, height of the header, and its height in a small window [px]. The height is fixed, so that text
-never moves STOP.
-"""
+"""Height of the header, and its height in a small window [px]. Both are fixed, so that text never moves STOP."""
 ROOMY, MEDIUM = (1150, 600), 700
 """Window size below which the header is low, and width below which it shows no times [px]."""
 

@@ -211,7 +211,7 @@ def test_ctrl_c_aborts_then_halts_and_ends_with_130(session: FakeSession, capsys
     assert harmonic(session, "--yes") == 130
     assert strengths == ["abort", "halt"]
     assert signal.getsignal(signal.SIGINT) is before
-    assert "the run was halted" in capsys.readouterr().err
+    assert "run halted" in capsys.readouterr().err
 
 
 def test_ctrl_c_breaks_the_wait_for_an_answer():

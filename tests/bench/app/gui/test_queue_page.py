@@ -142,7 +142,7 @@ def test_a_test_that_does_not_end_well_pauses_the_queue(
     _start(filled, spoken, qtbot)
     _run(filled, spoken, qtbot, status)
     assert _stages(filled) == [stage, Stage.WAITING, Stage.WAITING]
-    assert f"test 1 was {status}" in filled.queue.status.text()
+    assert f'the status of test 1 is "{status}"' in filled.queue.status.text()
     _start(filled, spoken, qtbot)
     assert _stages(filled)[1] is Stage.RUNNING
 

@@ -28,7 +28,7 @@ def test_from_the_form_to_the_file(window: Window, qtbot: QtBot, tmp_path: Path)
     qtbot.waitUntil(window.prompt.done.isEnabled, timeout=LONG_MS)
     qtbot.mouseClick(window.prompt.done, Qt.MouseButton.LeftButton)
     qtbot.waitUntil(lambda: window.pages.currentWidget() is window.results, timeout=LONG_MS)
-    assert "The run was completed" in window.results.message.text()
+    assert "Run completed" in window.results.message.text()
     assert window.results.table.rowCount() == 1
     assert len(window.run.traces.ring) > 100
     with open_datafile(tmp_path / "run" / "campaign.h5") as record:
