@@ -186,7 +186,7 @@ def _with_lead(configuration: "BenchConfiguration", lead: str | None) -> "BenchC
 
 
 def _report_lateness(laboratory: "Laboratory") -> None:
-    """State delays that a client would otherwise attribute to its line."""
+    """Warn of late values, which a client would otherwise attribute to its connection."""
     for name, delay in laboratory.late().items():
         print_warning(
             f"emulated laboratory: {name} sent values {delay:.2f} s late, because this computer is busy: close other "

@@ -90,7 +90,7 @@ class StopFilter(QObject):
 HEIGHT, LOW = 96, 72
 """Height of the header, and its height in a small window [px]. Both are fixed, so that text never moves STOP."""
 ROOMY, MEDIUM = (1150, 600), 700
-"""Window size below which the header is low, and width below which it shows no times [px]."""
+"""Window size below which the header is low, and width below which a low header shows neither times nor lamp [px]."""
 
 
 class Header(QWidget):
@@ -159,7 +159,9 @@ class Header(QWidget):
         self.refresh()
 
     def fit(self, width: int, height: int) -> None:
-        """Choose the layout for a window of this size [px]: a small one shows state, reason, remaining time, STOP."""
+        """Choose the layout for a window of this size [px]: a small window hides the details, a narrow one also times and
+        lamp.
+        """
         low = width < ROOMY[0] or height < ROOMY[1]
         self.details.setVisible(not low)
         self.times.setVisible(not low or width >= MEDIUM)

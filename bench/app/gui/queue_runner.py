@@ -1,4 +1,6 @@
-"""Runs a queue in the window: all plans are checked first, then tests run in separate sessions until a STOP."""
+"""Runs a queue in the window: all plans are checked first, then tests run in separate sessions. STOP, or a
+test that does not end well, pauses the queue.
+"""
 
 from collections.abc import Callable
 from datetime import datetime

@@ -292,8 +292,8 @@ def receive(connection: Connection) -> object | None:
 
 
 TRACES = ("drive", "acceleration", "displacement", "u1", "u2", "drift")
-"""Columns of traces: drive [V], table acceleration [m/s2] and displacement [m], displacements of the storeys and their
-difference [m], the last three relative to the table. Further channels follow, as in `bench.analysis.signals`.
+"""Columns of traces: drive [V], table acceleration [m/s2] and displacement [m], displacements of the storeys
+relative to the table [m] and the drift, their difference [m]. Further channels follow, as in `bench.analysis.signals`.
 """
 
 BIN = 0.002
