@@ -159,8 +159,8 @@ class Header(QWidget):
         self.refresh()
 
     def fit(self, width: int, height: int) -> None:
-        """Choose the layout for a window of this size [px]: a small window hides the details, a narrow one also times and
-        lamp.
+        """Choose the layout for a window of this size [px]: a small window hides the details, and a narrow one
+        also times and lamp.
         """
         low = width < ROOMY[0] or height < ROOMY[1]
         self.details.setVisible(not low)

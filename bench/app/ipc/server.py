@@ -73,8 +73,8 @@ class SafetyWatch:
             self.update_driven(time, at_once=at_once)
 
     def update_driven(self, time: float | None = None, *, at_once: bool = False) -> None:
-        """Send the inputs of an armed rig as `look` does, but raise RigError if they cannot be read: the rig has then cut
-        its output, and only this error states the reason.
+        """Send the inputs of an armed rig as `look` does, but raise RigError if they cannot be read: the rig has then
+        cut its output, and only this error states the reason.
         """
         self._time = self._time if time is None else time
         if self._rig is None or (now() - self._looked < PERIOD and not at_once):
