@@ -49,7 +49,7 @@ class Shaker(Parameters):
 
     @property
     def electric_damping(self) -> float:
-        """Damping by the back-EMF [N s/m]: Bl^2/R with a voltage amplifier, none with a current amplifier."""
+        """Damping by the back-EMF [N s/m]: (Bl)^2/R with a voltage amplifier, zero with a current amplifier."""
         return self.bl**2 / self.resistance if self.amplifier == "voltage" else 0.0
 
     @property

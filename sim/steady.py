@@ -175,7 +175,7 @@ def resting_state(specimen: Specimen, omega: float, amplitude: float) -> Orbit |
 
 
 def resting_rates(specimen: Specimen) -> NDArray[np.complex128]:
-    """Complex decay rates [1/s] of the frame whose spring is attached to a resting block, shape (4,)."""
+    """Poles [1/s] (complex eigenvalues) of the frame whose spring is attached to a resting block, shape (4,)."""
     mass, damping, stiffness = frame_matrices(specimen.frame)
     stiffness[0, 0] += specimen.k_c
     first_order = np.zeros((4, 4))

@@ -27,7 +27,7 @@ ANGLES = (0.0, 0.015, 0.03, 0.05, 0.08, 0.12, 0.2, 0.3, 0.45, 0.6, 0.8, 1.1, 1.4
 
 CAUTION = 0.3
 """Factor on the logarithm of the likelihood, below 1 because decays and small angles of nearly equal likelihood shift
-the mean by different amounts, and the grid contains only few of them.
+the mean by different amounts, and the grid contains only a few of them.
 """
 
 FINER = 9

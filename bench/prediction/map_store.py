@@ -95,7 +95,7 @@ class MapStore:
         self._lock.release()
 
     def remove(self) -> None:
-        """Remove the folder of a map whose results have been written. Its table may no longer be referenced."""
+        """Remove the folder of a map whose results have been written. Its table must no longer be referenced."""
         # Windows does not remove mapped files, which a reference in a cycle, as in a figure, would keep mapped
         gc.collect()
         _remove(self.folder, self._lock)

@@ -253,7 +253,7 @@ def _listed(values: Mapping[float, float], form: str) -> str:
 
 
 ABOUT = 0.1
-"""Largest difference between the best gain and 0.5."""
+"""Largest difference of the best gain from 0.5 that counts as "around half"."""
 
 
 def seismic_statement(curves: Sequence[SeismicCurve]) -> Statement:

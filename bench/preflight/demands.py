@@ -156,7 +156,9 @@ def load(
 
 
 def _heating(current: Array, held: float, time: float) -> float:
-    """Largest root of the exponential mean of current^2 / 2, with the last amplitude held for `held` [s]."""
+    """Largest rms current, the root of the exponentially weighted mean of current^2 / 2, with the last amplitude held
+    for `held` [s].
+    """
     power = 0.5 * current**2
     mean, _ = exponential_mean(power, float(np.exp(-STEP / time)))
     end = power[-1] + (mean[-1] - power[-1]) * np.exp(-held / time)

@@ -84,7 +84,7 @@ _RATES = "sensors support 250, 500, 1000, 2000 and 4000 1/s, newer ones also 800
 
 def _set_rate(dialogue: Dialogue, rate: float) -> bool:
     """Set the rate, which the command takes in kHz, and read it back: a rate that the sensor did not adopt would go
-    unnoticed and falsify the time scale.
+    unnoticed and make the time base wrong.
 
     Returns False if the sensor lacks the query, which the manual does not document; the values must then be counted.
     """
@@ -170,7 +170,9 @@ class SerialLaser:
 
     @property
     def silent(self) -> bool:
-        """True if no measurement has arrived for 10 periods and 0.4 s, and also before `start` and after `stop`."""
+        """True if no measurement has arrived for 10 periods or 0.4 s, whichever is longer; also before `start` and
+        after `stop`.
+        """
         if self._stream is None or not self._streaming:
             return True
         return now() - self._stream.last_arrival > max(_SILENT_PERIODS / self._rate, _SILENT_TIME)

@@ -24,8 +24,8 @@ specimen are required to leave the other multipliers unexcited; a larger number 
 """
 
 START, LEAST = 0.7, 0.02
-"""Largest deviation at the release, relative to `BOUND`, for an orbit predicted as stable; and smallest deviation,
-relative to the orbit, for an unstable one, in which the deviation then grows.
+"""START: largest deviation at the release, relative to `BOUND`, for an orbit predicted to be stable. LEAST: smallest
+deviation, relative to the orbit, for an unstable one, whose deviation then grows.
 """
 
 LOST = 2.0

@@ -157,7 +157,7 @@ class Difference:
 
     @property
     def value(self) -> float:
-        """The other gain minus that of the reference; NaN without both."""
+        """The other gain minus that of the reference; NaN if either is missing."""
         return nan if self.reference is None or self.other is None else self.other - self.reference
 
     @property
