@@ -82,16 +82,15 @@ def gui(
     progress("opening the window")
     configuration = configuration_from(config, seed, specimen)
     require_display()
-
-    from bench.app.gui.window import open_window
-
     protocols, failed = all_protocols()
     for line in failed:
         print_warning(line)
     # the paper's campaign is selected first
     protocols = sorted(protocols, key=lambda each: each.name != "harmonic")
-    # until the window installs the handler that closes it
+    # until the window installs the handler that closes it; PySide6 aborts on an exception that is raised in its import
     with leaving():
+        from bench.app.gui.window import open_window
+
         return open_window(configuration, protocols, config, queue)
 
 
