@@ -27,7 +27,7 @@ from tests.faults.places import Place
 _BEAT = 0.005
 _LATE = 0.2 * SETTING.lead / SETTING.rate
 """A turn of the loop waits for several threads in turn, each of which a machine that is so late [s] holds up."""
-_SAYS_LATE = ("the drive was written too late", "delay of a block", "DEADLINE_EXCEEDED")
+_SAYS_LATE = ("the drive was written too late", "delay of a block", "DEADLINE_EXCEEDED", "after its block was due")
 """What the program says of a machine that is too late for it."""
 
 
