@@ -55,7 +55,7 @@ def condition(coupled: Specimen, dwell: Sweep, times: ArrayLike, motion: Motion)
 
     def fine(specimen: Specimen, amplitude: float) -> Motion:
         drive = SineProgram([Sweep.dwell(dwell.duration, amplitude, dwell.omega[0])])
-        return simulate(specimen, drive, sample_times=times, tolerance=FINE)
+        return simulate(specimen, drive, sample_times=times, peaks_from=None, tolerance=FINE)
 
     amplitude = dwell.amplitude[0]
     exact = fine(coupled, amplitude)
