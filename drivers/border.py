@@ -19,11 +19,11 @@ from sim.errors import RockbenchError
 
 MOST_CHANNELS = 256
 LOWEST_RATE = 1.0
-"""Smallest sample rate [1/s]; with a tiny one, a replay would never end."""
+"""Smallest sample rate [1/s]; at a tiny one, a replay would never end."""
 HIGHEST_RATE = 1e6
 """Largest sample rate [1/s]; above it, this program's buffers would hold less than a second."""
 LONGEST_LEAD = 10.0
-"""Longest lead [s]; the guard's commands take effect after this delay."""
+"""Longest lead [s]: the time after which a drive sample written by the guard takes effect."""
 HIGHEST_VOLTAGE = 100.0
 """Largest drive range [V]."""
 
@@ -65,8 +65,8 @@ class CheckedRig:
 
     def __init__(self, rig: Rig, backend: str) -> None:
         self._rig, self.backend = rig, backend
-        # every safety input named so far, in order; open unless reported good. A stopped rig may omit an input that it
-        # names only while armed, such as an amplifier that is ready only while enabled
+        # every safety input reported so far, in order; open unless reported good. A stopped rig may omit an input that
+        # it reports only while armed, such as that of an amplifier that is ready only while enabled
         self._inputs: dict[str, bool] = {}
         self._while_armed: dict[str, bool] = {}
         self._armed = False
@@ -259,7 +259,7 @@ class CheckedRig:
 
 
 _NONE: tuple[()] = ()
-"""Result of `raw_values` for most rigs, in every block; compared by identity, since a backend may return any type."""
+"""Result of `raw_values` of most rigs, for every block; compared by identity, since a backend may return any type."""
 
 
 class _Calls:

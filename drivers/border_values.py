@@ -67,7 +67,7 @@ def is_raw(value: Any, sensors: list[str]) -> bool:
 
 
 def wrong_with(channel: Any) -> str:
-    """Defect of a channel; empty for a valid one."""
+    """Description of the defect of a channel; empty for a valid one."""
     if not isinstance(channel, Channel):
         return f"{type(channel).__name__} is not a channel"
     if not (is_text(channel.name) and _NAME.fullmatch(channel.name)):

@@ -12,16 +12,14 @@ from contextlib import suppress
 from sim import waiting
 
 OWN_CONSOLE = subprocess.CREATE_NO_WINDOW if sys.platform == "win32" else 0
-"""Creation flag of the child (Windows): not attached to the program's console, it survives the closing of that
-console.
-"""
+"""Creation flag of the child on Windows: a child without the program's console survives the closing of that console."""
 
 ENDING = 2.0
-"""Longest wait for a child to end [s]."""
+"""Longest wait for a child to end [s], after which it is killed."""
 
 
 class ChildProcess:
-    """A process that runs `module` with `arguments`, and communicates by its standard `input` and `output`."""
+    """A process that runs `module` with `arguments`; `input` and `output` are pipes to its standard streams."""
 
     def __init__(self, module: str, *arguments: str) -> None:
         self._process = subprocess.Popen(
@@ -41,14 +39,14 @@ class ChildProcess:
         self.input.flush()
 
     def end(self) -> None:
-        """Close the input, and wait until the process has ended; may be called repeatedly."""
+        """Close the input and wait until the process has ended, or kill it after `ENDING`; may be called repeatedly."""
         with suppress(OSError):
             self.input.close()
         waiting.end(self._process, ENDING)
 
 
 def ignore_requests() -> None:
-    """Ignore requests to end, for child processes that end when their standard input is closed."""
+    """Ignore termination requests in a child process that ends when its standard input is closed."""
     for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK"):
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), signal.SIG_IGN)

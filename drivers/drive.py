@@ -15,7 +15,7 @@ from sim.errors import InvalidInput
 
 
 class Drive:
-    """Checks written samples and counts those queued, without playing them.
+    """Checks drive samples and counts those queued; it does not play them.
 
     `range` is the largest magnitude [V], `lead` the number of samples required in addition to a block. Raises
     InvalidInput for a negative lead.
@@ -106,7 +106,8 @@ class RigState(Enum):
 class RigBase:
     """State, drive and clock of a rig: methods of `drivers.rig.Rig` common to all backends.
 
-    `lead` is the number of drive samples that must be queued. As a context manager it closes the rig.
+    `lead` is the number of drive samples that must be queued beyond the block being read. As a context manager it
+    closes the rig.
     """
 
     def __init__(self, drive_range: float, lead: int, clock: Clock) -> None:

@@ -31,7 +31,7 @@ class InputOverflow(RigError):
 
 
 class DeviceTimeout(RigError):
-    """A device did not respond in time."""
+    """A device did not respond, or did not complete an operation, in time."""
 
     error_code = "device_timeout"
 

@@ -42,7 +42,7 @@ class Recording(Protocol):
 
     @property
     def drive_range(self) -> float:
-        """Largest magnitude of the drive [V] of the recorded rig."""
+        """Largest magnitude of the recorded rig's drive [V]."""
         ...
 
     @property
@@ -65,7 +65,7 @@ class Course(Protocol):
     """Data of the recorded runs other than their samples; runs are numbered from 0."""
 
     def in_hand(self, run: int, samples: int) -> float:
-        """Bench time [s] at which the first `samples` samples of `run` had been read."""
+        """Time since the start of the recording [s] at which the first `samples` samples of `run` had been read."""
         ...
 
     def opened(self, run: int, samples: int) -> Collection[str]:
@@ -81,8 +81,8 @@ class ReplayRig(RigBase):
     """Rig that replays the next recorded run at each arming.
 
     The drive is checked as in every rig but has no effect. A block ends early at a gap or the end of the recording;
-    after a gap the next block begins at a later sample, and the samples of the gap consume no drive. `lead` is by
-    default the recording's lead. An optional `course` determines when blocks arrive, on a `clock` that begins at 0 with
+    after a gap the next block begins at a later sample, and the samples of the gap consume no drive. `lead` defaults to
+    the recording's lead. An optional `course` determines when blocks arrive, on a `clock` that begins at 0 with
     the recording, and when safety inputs open. The caller closes the recording after closing the rig.
     """
 

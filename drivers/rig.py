@@ -1,4 +1,4 @@
-"""Interface of a rig: channels, drive output, blocks of samples, and cutting of the output.
+"""Interface of a rig: channels, drive output, blocks of samples, and emergency cut of the output.
 
 Sample `i` of the drive is output while sample `i` of the inputs is acquired: both are counted from `arm()`. The drive
 is non-regenerating: each sample is written once and played once, and at least `lead` samples must be queued when a
@@ -26,9 +26,9 @@ from sim.parameters import column
 class RawValues:
     """Values of a sensor with its own clock, before resampling: arrays of integers, shape (n,) each.
 
-    `sensor` is the name of its channel. `index` counts the measurements, with gaps where some were lost; `time` is the
-    time of the measurement on the sensor's clock [us], `code` the sensor's word, and `arrival` the time at which the
-    word had been received [us of the computer's clock since `arm()`].
+    `sensor` is the name of its channel. `index` is the number of the measurement, with gaps where values were lost;
+    `time` is the time of the measurement on the sensor's clock [us], `code` the sensor's word, and `arrival` the time
+    by which the word had been received [us of the computer's clock since `arm()`].
     """
 
     sensor: str
@@ -59,7 +59,7 @@ class Block:
 class Alignment:
     """Alignment of a sensor's own clock to the sample clock in one run.
 
-    A value taken at second t of the sensor's clock is placed at second `offset + rate * t + delay` of the sample clock.
+    A value measured at time t on the sensor's clock is placed at `offset + rate * t + delay` on the sample clock.
     """
 
     sensor: str = column("", "name of the channel")
@@ -106,8 +106,8 @@ class OperatorTask(StrEnum):
     """Spring and block are removed, and the storeys are clamped to the table, so that they move with it."""
     UNLOCK_FRAME = "unlock frame"
     HOLD_BLOCK = "hold block"
-    """As MOUNT_SPRING, but with the block clamped to the table: it cannot lift, and it fixes the spring to the
-    table.
+    """As MOUNT_SPRING, but with the block clamped to the table, so that it cannot lift and the end of the spring is
+    fixed to the table.
     """
     LOCK_TABLE = "lock table"
     """The table, with any specimen, is clamped to the ground at mid stroke; it must not be driven."""
@@ -165,14 +165,14 @@ class Rig(Protocol):
         ...
 
     def raw_values(self) -> tuple[RawValues, ...]:
-        """Values received since the last call, or since `arm()`, from sensors with their own clocks; usually none.
+        """Values received from sensors with their own clocks since the last call, or since `arm()`; usually none.
 
         They remain available after `stop()` and a failure. A backend of another package may lack this method.
         """
         ...
 
     def interlocks(self) -> Mapping[str, bool]:
-        """States of the existing safety inputs by name; True if closed (good)."""
+        """States of the wired safety inputs by name; True if closed (good)."""
         ...
 
     def arm(self) -> None:

@@ -27,9 +27,9 @@ class SimulatedRig(ComputedRig):
     """Rig with a simulated bench. With a `VirtualClock` it runs as fast as the machine allows; with a `WallClock` a
     block is returned at the time at which it would have been measured.
 
-    `lead` is the number of drive samples that must be queued, 50 ms by default. Between two runs the bench coasts at
-    zero drive until it is at rest. A part held by hand is released a few seconds after sample 0; if the run ends
-    earlier, the part remains held. Every spring is `spring_factor` times as stiff as its label.
+    `lead` is the number of drive samples that must be queued beyond a block, 50 ms by default. Between two runs the
+    bench coasts at zero drive until it is at rest. A part held by hand is released a few seconds after sample 0; if the
+    run ends earlier, the part remains held. Every spring is `spring_factor` times as stiff as its label.
     """
 
     def __init__(

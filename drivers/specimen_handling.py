@@ -16,8 +16,8 @@ _CLAMPED = 400.0
 class SpecimenHandling:
     """Operator actions on the original specimen, with springs `spring_factor` times as stiff as their labels.
 
-    Mounting a spring, removing the block and clamping the storeys first release any part held by hand and the clamp of
-    the block. The table's lock and laser 2's target change only by their own tasks.
+    Mounting a spring, removing the block, placing it for laser 2 and clamping the storeys first release any part held
+    by hand and the clamp of the block. Only their own tasks change the table's lock and the target of laser 2.
     """
 
     def __init__(self, specimen: Specimen, spring_factor: float = 1.0) -> None:
@@ -66,7 +66,7 @@ class SpecimenHandling:
                 return replace(now, pull=self._pull(amount, now))
 
     def _with_spring(self, work: OperatorTask, stiffness: float | None, now: Arrangement) -> Arrangement:
-        """The arrangement with the spring of this label and the block, free to rock or clamped."""
+        """The arrangement with the block, free to rock or clamped, and the spring labelled `stiffness` [N/m]."""
         label = _needed("stiffness", stiffness, "mounting a spring requires its stiffness in N/m")
         if now.watched is not None:
             elsewhere = f"{work.value} is refused: laser 2 measures the block, not storey 2; watch storeys first"

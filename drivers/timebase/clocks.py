@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from drivers.timebase.fit import Bounds, Points, bends, floor_below, needs_refit, rate_error, typical
 
 _TOLERANCE = 0.25
-"""Largest deviation of a history from a line, in sample periods, before its older half is discarded. Since counts are
+"""Deviation of a history from a line, in sample periods, beyond which its older half is discarded. Since counts are
 integers, the bounds drift by a fraction of a period when the readings are synchronous with the clock.
 """
 _RECENT = 2.0
@@ -46,7 +46,7 @@ class SampleClock:
         self._now = after
 
     def seconds(self, host: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Seconds of the sample clock at `host` [s of the machine's clock], same shape."""
+        """Times on the sample clock [s] at the times `host` of the machine's clock [s], same shape."""
         self._refresh()
         return (host - self._offset) / (1.0 + self._slope)
 
@@ -102,7 +102,7 @@ def _least(points: Points) -> float:
 
 
 _SENSOR_TOLERANCE = 100e-6
-"""Largest deviation of a history from a line [s] before its older half is discarded."""
+"""Deviation of a history from a line [s] beyond which its older half is discarded."""
 
 
 class SensorClock:

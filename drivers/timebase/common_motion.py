@@ -35,9 +35,9 @@ def common_motion(
 ) -> CommonMotion:
     """Compare the complex amplitudes of two signals at `omega` [rad/s], shape (m,) each.
 
-    The frequencies, starting near zero, must be so closely spaced that the delay shifts the phase by less than pi
-    between neighbours. Frequencies are weighted by the square of the first signal's amplitude. Raises InvalidInput for
-    fewer than three frequencies, or if an amplitude is zero.
+    The frequencies, in any order, must begin near zero and be so closely spaced that the delay shifts the phase by less
+    than pi between neighbours. Frequencies are weighted by the square of the first signal's amplitude. Raises
+    InvalidInput for fewer than three frequencies, or if an amplitude is zero.
     """
     if omega.size < _LEAST:
         raise InvalidInput("frequencies", omega.size, f"at least {_LEAST} are required")

@@ -16,8 +16,8 @@ _KEPT = 120.0
 
 @dataclass(frozen=True)
 class Points:
-    """Readings at ascending `seconds` of one clock, shape (n,); `delay` is another clock's reading minus this one's, up
-    to sign, shape (n,) [s].
+    """Readings at ascending `seconds` of one clock, shape (n,); `delay`, shape (n,) [s], is another clock's reading
+    minus this one's, or the opposite.
     """
 
     seconds: NDArray[np.float64]
@@ -39,7 +39,7 @@ class Bounds:
         return self._points
 
     def add(self, seconds: NDArray[np.float64], delay: NDArray[np.float64]) -> None:
-        """Add readings, shape (n,) each [s], none older than the last interval."""
+        """Add readings, shape (n,) each [s]; none may precede the newest interval of the history."""
         kept = self._points
         if seconds.size == 0:
             return
@@ -130,7 +130,7 @@ def _side(seconds: NDArray[np.float64], delay: NDArray[np.float64], sign: float)
 
 
 def _without_stalls(side: _Side, slope: float) -> _Side:
-    """The side without outliers far above its line, of which only the approximate slope is needed."""
+    """The side without outliers far above its line; an approximate slope of the line is sufficient."""
     above = side.delay - side.sign * slope * side.seconds
     above -= above.min()
     kept = above <= _FAR * typical(above) + _RESOLUTION
@@ -174,8 +174,8 @@ def typical(above: NDArray[np.float64]) -> float:
 def bends(points: Points, slope: float, tolerance: float) -> bool:
     """Whether the points deviate from the line by more than `tolerance` [s] plus chance, as after a change of the rate.
 
-    Compares the smallest delays of the last three quarters of the history. The first quarter is ignored, since its
-    readings may have been made differently.
+    Compares the smallest delay in each of the last three quarters of the history. The first quarter is ignored, since
+    its readings may have been made differently.
     """
     size = len(points) // 4
     if size < _QUARTER:

@@ -1,4 +1,4 @@
-"""Alignment of a sensor's clock by marks: pulses on the sample clock that switch the beam of the sensor off.
+"""Alignment of a sensor's clock by pulses on the sample clock that switch the beam of the sensor off.
 
 Each rising edge lies between the last measurement with the beam and the first one without it, which bounds the offset
 between the clocks to one measuring cycle. The edges are spaced by a golden-ratio fraction of a cycle, so that their
@@ -16,11 +16,11 @@ _EDGES = 40
 _SPACING = 0.0125
 """Approximate time between two pulses [s]."""
 _CYCLES = 16
-"""Least number of measuring cycles between two pulses."""
+"""Minimum number of measuring cycles between two pulses."""
 _BEGIN = 0.05
 """Time from the start of the sample clock to the first pulse [s], during which the sensor measures with its beam on."""
 _ENOUGH = 20
-"""Least number of edges found for an alignment."""
+"""Minimum number of edges that must be found for an alignment."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ _RATE_SPREAD = 40e-6
 
 @dataclass(frozen=True)
 class Mark:
-    """A point common to two clocks: second `time` of the sensor is second `seconds` of the sample clock, to the
+    """A point common to two clocks: `time` [s] on the sensor's clock is `seconds` on the sample clock, with the
     standard uncertainty `uncertainty` [s].
     """
 
@@ -78,17 +78,17 @@ class Mark:
 def marked_point(
     pulses: Pulses, time: NDArray[np.float64], is_lit: NDArray[np.bool_], rate: float, rough: float
 ) -> Mark | None:
-    """The point at the middle of the pulses, which depends least on the rates of the clocks, from measurements at
-    ascending `time` [s of the sensor's clock], shape (n,), with and without the beam.
+    """The point at the middle of the pulses, which depends least on the rates of the clocks.
 
-    `rate` is the number of seconds of the sample clock per second of the sensor; `rough` is the second of the sample
-    clock at second 0 of the sensor, to within half the time between two pulses. Returns None if fewer than half of the
-    edges are found.
+    `time` [s of the sensor's clock], shape (n,), are the ascending times of the measurements, and `is_lit`, shape (n,),
+    is False for those without the beam. `rate` is the number of seconds of the sample clock per second of the sensor;
+    `rough` is the time on the sample clock at second 0 of the sensor [s], to within half the time between two pulses.
+    Returns None if fewer than half of the edges are found.
     """
     onsets = np.flatnonzero(is_lit[:-1] & ~is_lit[1:]) + 1
     if not onsets.size:
         return None
-    # the first onset belongs to the edge that is nearest to it by the rough offset
+    # the first onset is attributed to the edge that is nearest to it according to the rough offset
     candidates = pulses.edges - rate * float(time[onsets[0]])
     rough = float(candidates[np.argmin(np.abs(candidates - rough))])
     cycle = float(np.median(np.diff(time)))

@@ -19,8 +19,8 @@ class Marks:
 
 
 class Resampler:
-    """Interpolates within at least the last `capacity` readings: index, second of the sensor's clock, counts or fault
-    mark.
+    """Interpolates within the last `capacity` readings or more; a reading consists of its index, its time on the
+    sensor's clock [s], and counts or a fault mark.
 
     Counts beyond +-`largest` are fault marks; `lost_mark` marks missing values, `late_mark` values not yet received.
     """
@@ -38,7 +38,7 @@ class Resampler:
         return (int(self._index[self._end - 1]), float(self._time[self._end - 1])) if self._end else None
 
     def values(self, begin: float) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-        """Times of the readings from the sensor's second `begin` on, and which of them are counts, shape (n,) each."""
+        """Times [s] of the readings from `begin` on, and a mask of those that are counts, shape (n,) each."""
         first = int(np.searchsorted(self._time[: self._end], begin))
         kept = slice(first, self._end)
         return self._time[kept].copy(), np.abs(self._counts[kept].astype(np.int32)) <= self._largest
@@ -62,8 +62,8 @@ class Resampler:
     def at(self, times: NDArray[np.float64]) -> NDArray[np.int16]:
         """Counts at sensor times, shape (n,), by linear interpolation between readings.
 
-        Where one of the two readings is not a distance, its fault mark is returned; where a reading is missing, the
-        mark of lost values; after the last reading, the mark of late values.
+        Where one of the two readings is a fault mark, that mark is returned; where a reading is missing, and before the
+        first one, the mark of lost values; after the last reading, and at a time that is NaN, the mark of late values.
         """
         seen = np.full(times.shape, self._late_mark, dtype=np.int16)
         if self._end < 2:
@@ -83,8 +83,8 @@ class Resampler:
 
 
 RARE, RECOVERY = 3.0, 0.05
-"""Number of implausible values within a short time above which they are no longer considered single faults, and the
-decrease of that number per plausible value.
+"""Number of implausible values within a short time from which further ones are no longer considered single faults, and
+the decrease of that number per plausible value.
 """
 
 
@@ -148,7 +148,8 @@ def resampled(
     samples: NDArray[np.int64],
     sample_rate: float,
 ) -> NDArray[np.int16]:
-    """Counts at `samples` of a run, shape (n,), ascending, from all values received in it, placed by its `alignment`.
+    """Counts at the ascending sample numbers `samples` of a run, shape (n,), from all values received in the run, with
+    times according to its `alignment`.
 
     Values that arrived too late for their block are included. `marked` converts the words of the sensor to counts of at
     most +-`largest`, or to fault marks beyond.

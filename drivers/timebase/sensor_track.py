@@ -41,19 +41,19 @@ _FIRST = 10.0
 
 
 class Course:
-    """The sensor's clock as a function of the sample clock: continuous, and linear within each block."""
+    """Time on the sensor's clock as a function of the sample clock: continuous, and linear within each block."""
 
     def __init__(self) -> None:
         self._began = self._seconds = self._time = np.nan
 
     @property
     def time(self) -> float:
-        """Second of the sensor's clock at the last requested sample; NaN before the first."""
+        """Time on the sensor's clock at the last requested sample [s]; NaN before the first request."""
         return self._time
 
     def times(self, line: Line, seconds: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Sensor times, shape (n,), at ascending `seconds`, following the present `line`; advances to the last of
-        them.
+        """Sensor times [s], shape (n,), at ascending `seconds` of the sample clock, following the present `line`; the
+        next request continues from the last one.
         """
         end = float(seconds[-1])
         if not self._seconds < float(seconds[0]):
@@ -68,7 +68,7 @@ class Course:
         return times
 
     def reach(self, line: Line, time: float) -> float:
-        """Latest second of the sample clock for which `times` would return a time of at most `time` [s]."""
+        """Latest time on the sample clock [s] for which `times` would return at most `time` [s]."""
         known = line.seconds_at(time)
         if np.isnan(self._seconds):
             return known
@@ -103,10 +103,10 @@ clock.
 class SensorTrack:
     """Resamples the values of the sensor `name` on the grid of the sample clock.
 
-    `rate` is its measuring rate [1/s]; `delay` [s] is added to the times estimated from arrivals. `marked` converts its
+    `rate` is its measuring rate [1/s]; `delay` [s] is added to the estimated times of its values. `marked` converts its
     codes to counts up to +-`largest`, and its error words to fault marks outside that range; `marks` are the fault
-    marks of missing, late and implausible values. Values that change by more than `largest_step` per measurement are
-    implausible. A restart of the sensor's clock begins a new history.
+    marks of missing, late and implausible values. Values that change by more than `largest_step` counts per measurement
+    are implausible, see `Plausibility`. A restart of the sensor's clock begins a new history.
     """
 
     def __init__(
@@ -144,7 +144,7 @@ class SensorTrack:
         code: NDArray[np.int32],
         arrival: NDArray[np.float64],
     ) -> None:
-        """Add readings in order, shape (n,) each: index, second of the sensor's clock, code, and arrival [s of the
+        """Add readings in order, shape (n,) each: index, time on the sensor's clock [s], code, and arrival [s of the
         machine's clock]. Repeated readings are dropped.
         """
         restarts = np.flatnonzero(np.diff(time) < -_BACK) + 1
@@ -152,15 +152,15 @@ class SensorTrack:
             self._add(index[part], time[part], code[part], arrival[part])
 
     def reach(self, clock: SampleClock) -> float:
-        """Second of the sample clock up to which values are available; minus infinity if none can be placed."""
+        """Time on the sample clock up to which values are available [s]; minus infinity if none can be placed."""
         line, last = self._line(clock), self._resampler.last
         if line is None or last is None:
             return -np.inf
         return self._course.reach(line, last[1])
 
     def mark(self, clock: SampleClock, pulses: Pulses) -> bool:
-        """Align the clock by pulses that have switched the sensor's beam off. Returns False if too few of them are
-        found in its values, or its clock is still unknown.
+        """Align the sensor's clock by pulses that have switched its beam off. Returns False if too few of them are
+        found in its values, or one of the clocks is still unknown.
         """
         self._mark = None
         line = self._line(clock)
