@@ -1,7 +1,8 @@
 """Readings of the sample clock by a separate process, through a separate connection to a gRPC device server.
 
-They do not delay the acquisition loop, and their duration does not depend on its load. Half the difference between the
-transmission times to and from the server shifts every time derived from a call, equally in a check and in a run.
+The readings do not delay the acquisition loop, and their duration does not depend on its load. Half the difference
+between the transmission times to and from the server shifts every time derived from a call, equally in a check and in a
+run.
 """
 
 import struct
@@ -30,7 +31,7 @@ Reading = tuple[float, int, float]
 
 
 class ClockWatch:
-    """The process that reads the sample clock of the task `name` at `rate` [1/s], from `daq.server`."""
+    """The process that reads the sample clock, of `rate` [1/s], of the task `name` on `daq.server`."""
 
     def __init__(self, daq: Daq, name: str, rate: float) -> None:
         self._child = ChildProcess("drivers.daqmx.clock_watch", name, repr(rate))

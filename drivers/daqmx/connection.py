@@ -80,9 +80,10 @@ _PORT = 31763
 class Connection:
     """Connection to the driver of this PC or of a server; it provides the options with which tasks are created there.
 
-    Encrypted if `tls` is given. `plain` permits an unencrypted connection to a server outside private networks.
-    Raises DeviceNotFound if no server answers within 2 s, InvalidInput for an address without port, for a plain
-    connection to a public network, and for certificates that cannot be read.
+    `patience` [s] is the time allowed for a call beyond its own time-out. The connection is encrypted if `tls` is
+    given. `plain` permits an unencrypted connection to a server outside private networks. Raises DeviceNotFound if no
+    server answers within 2 s, InvalidInput for an address without port, for a plain connection to a public network, and
+    for certificates that cannot be read.
     """
 
     def __init__(self, server: str | None, patience: float, tls: Tls | None = None, *, plain: bool = False) -> None:
@@ -104,7 +105,7 @@ class Connection:
         return self._deadline is not None and bool(self._deadline.late)
 
     def options(self, name: str = "") -> Options:
-        """Options for creating a task of this name, by which later processes can find it."""
+        """Options for creating a task of this name, under which later processes can find it."""
         return self._session(name, SessionInitializationBehavior.INITIALIZE_SERVER_SESSION)
 
     def attaching(self, name: str) -> Options:

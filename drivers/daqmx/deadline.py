@@ -9,9 +9,9 @@ import grpc
 _SLOW = {"ResetDevice": 10.0}
 """Additional time for calls whose requests have no time-out [s]."""
 _LATE = 0.1
-"""Fraction of `patience` granted to calls after a first time-out."""
+"""Fraction of `patience` allowed for calls after a first time-out."""
 _LEAST = 0.1
-"""Shortest time granted beyond a call's own time-out [s]."""
+"""Shortest time allowed beyond a call's own time-out [s]."""
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,9 @@ class CallDetails(grpc.ClientCallDetails):
 
 
 class Deadline(grpc.UnaryUnaryClientInterceptor):
-    """Sets the deadline of every call to the call's time-out plus `patience` seconds."""
+    """Sets the deadline of every call to the call's own time-out plus `patience` [s]; after a first time-out, only a
+    tenth of `patience` is allowed.
+    """
 
     def __init__(self, patience: float) -> None:
         self._patience = patience
@@ -57,8 +59,8 @@ class Deadline(grpc.UnaryUnaryClientInterceptor):
 
 
 class ReusedCalls:
-    """A channel that creates the object for calling a procedure of the server only once; nidaqmx requests the objects
-    of all 450 procedures for every task.
+    """A channel that creates the call object of each procedure of the server only once; nidaqmx requests the objects of
+    all 450 procedures for every task.
     """
 
     def __init__(self, channel: Any) -> None:
@@ -66,7 +68,7 @@ class ReusedCalls:
         self._calls: dict[str, Any] = {}
 
     def unary_unary(self, method: str, *arguments: Any, **options: Any) -> Any:
-        """The object that calls `method`, for gRPC's arguments and options."""
+        """The object that calls `method`; arguments and options are those of gRPC."""
         if method not in self._calls:
             self._calls[method] = self._channel.unary_unary(method, *arguments, **options)
         return self._calls[method]

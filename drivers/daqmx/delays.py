@@ -42,7 +42,7 @@ class Connected:
 
 _SAMPLES = 40.0 + 5.0 / 512.0
 _FIGURE = 1.0e-6
-"""Standard uncertainty of a delay in specifications [s]: rounding to two digits, and tolerance of analogue filters."""
+"""Standard uncertainty of a delay from specifications [s]: rounding to two digits, tolerance of analogue filters."""
 _KNOWN = {"9234": (2.6e-6, 5.0e-6), "9237": (4.5e-6, _FIGURE), "9239": (3.3e-6, _FIGURE)}
 """Input delay, by model, of delta-sigma modules without a property for it: time [s] in addition to (40 + 5/512)
 samples, and its standard uncertainty [s], from their specifications and NI's knowledge base, kA00Z0000004A0YSAU. No NI
@@ -56,7 +56,8 @@ _DELTA_SIGMA_BITS = 24
 def input_delays(
     task: library.Task, channels: Sequence[InputChannel], devices: Sequence[Connected], rate: float
 ) -> tuple[InputDelay, ...]:
-    """The delay of each input of a clocked task, read from the device if it has a property for it, else tabulated.
+    """The delay of each input of a clocked task, read from the device if it has a property for it, else tabulated; with
+    infinite uncertainty if it is unknown.
 
     `devices` are the devices of the channels, in order. Removal of the delay by the device itself is switched off, so
     that the delay is removed in one place only.
@@ -83,7 +84,11 @@ def _multiplexed(number: int, total: int, step: float | None, rate: float) -> In
     if step is not None:
         return InputDelay(-number * step, _CLOCKED, "AI.ConvRate")
     # the time between two inputs is at most the sample period divided by their number
-    return InputDelay(0.0, number / (total * rate) / sqrt(3.0), "multiplexer without AI.ConvRate: within a sample")
+    return InputDelay(
+        0.0,
+        number / (total * rate) / sqrt(3.0),
+        "multiplexer without AI.ConvRate: unknown, less than one sample period",
+    )
 
 
 def _step(task: library.Task, device: str, *, several: bool) -> float | None:

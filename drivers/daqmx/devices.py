@@ -25,8 +25,8 @@ class FoundDevice:
     """One device or module. Ranges are (lowest, highest) pairs [V]; rates [1/s] are None for functions that the device
     lacks.
 
-    `lines` can be digital outputs, `input_lines` can be digital inputs. `chassis` is the chassis of a module, None for
-    other devices. `input_rate` is the maximum for one channel; `total_input_rate` is shared by all channels unless
+    `lines` can be used as digital outputs, `input_lines` as digital inputs. `chassis` is the chassis of a module, None
+    for other devices. `input_rate` is the maximum for one channel; `total_input_rate` is shared by all channels unless
     `simultaneous`.
     """
 
@@ -61,7 +61,7 @@ class FoundDevice:
 def find_devices(server: str | None, tls: Tls | None = None, *, plain: bool = False) -> list[FoundDevice]:
     """The devices of this PC, or of the gRPC device server at `server` (host:port); see `Connection`.
 
-    Raises DeviceNotFound if there is no driver or no server.
+    Raises DeviceNotFound if there is no driver or no server, and InvalidInput as `Connection` does.
     """
     connection = Connection(server, _PATIENCE, tls, plain=plain)
     try:

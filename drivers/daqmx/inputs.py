@@ -23,8 +23,8 @@ from drivers.errors import DeviceTimeout, RigError
 class InputScaling:
     """One input: volts = coefficients[0] + coefficients[1] counts + coefficients[2] counts^2 + ...
 
-    The coefficients are the device's own calibration. Counts from `lowest` to `highest` are measurements; beyond them,
-    the converter is saturated. `bits` is the size of a raw sample.
+    The coefficients are those of the device's calibration. Counts from `lowest` to `highest` are measurements; beyond
+    them, the converter is saturated. `bits` is the size of a raw sample.
     """
 
     coefficients: tuple[float, ...]
@@ -66,7 +66,7 @@ TERMINAL_CONFIGURATIONS: dict[Wiring, TerminalConfiguration] = {
 
 
 class Inputs:
-    """Task of all inputs, in the given order, on `devices`; `delays` are the inputs' delays.
+    """Task of all `inputs`, in the given order; `devices` are the devices of the inputs, `delays` the inputs' delays.
 
     The output starts on `trigger` and is clocked from `clock`, by default terminals of the inputs' device.
     """

@@ -313,7 +313,7 @@ def goes_to_zero(output: str) -> AOExpirationState:
 
 
 def unscaled_reader(task: Task) -> UnscaledReader:
-    """Reads the inputs of a task. The caller ensures the array's shape, since checking it would cost an extra call."""
+    """Reader of a task's inputs. The caller ensures the array's shape, since checking it would cost an extra call."""
     reader = AnalogUnscaledReader(task.in_stream)
     reader.verify_array_shape = False
     return cast(UnscaledReader, reader)
@@ -326,12 +326,12 @@ def analog_writer(task: Task, *, auto_start: bool) -> AnalogWriter:
 
 
 def lines_reader(task: Task) -> LinesReader:
-    """Reads the lines of a task; starts it for the read if it is not running."""
+    """Reader of a task's lines; a read starts a task that is not running, and stops it again."""
     reader = DigitalMultiChannelReader(task.in_stream)
     reader.verify_array_shape = False
     return cast(LinesReader, reader)
 
 
 def line_writer(task: Task) -> LineWriter:
-    """Writes the line of a task; starts it if it is not running."""
+    """Writer of a task's line; a write starts a task that is not running."""
     return cast(LineWriter, cast(Any, DigitalSingleChannelWriter)(task.out_stream, True))

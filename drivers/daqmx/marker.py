@@ -12,7 +12,7 @@ NAME = "rockbench_marker"
 
 
 class Marker:
-    """Train of `pulses` that begins with the sample clock of each run, at `daq.laser_marker`.
+    """Train of `pulses` at `daq.laser_marker`, which begins with the sample clock of each run.
 
     The lasers are on while the output is low. The counters and the sample clock of a device share one timebase.
     """
@@ -51,7 +51,7 @@ class Marker:
 
 
 def _counter(connection: Connection, daq: Daq) -> str | None:
-    """The configured counter; with `automatic`, the first one of the device of the output, None without counters."""
+    """The configured counter; with `automatic`, the first one of the output's device, or None if it has none."""
     if daq.laser_marker != AUTOMATIC:
         return daq.laser_marker
     with translated("looking for a counter"):

@@ -21,7 +21,7 @@ NAME = "rockbench_out"
 _AHEAD = 2.0
 """Length of the buffer beyond the lead [s]."""
 _ZERO_TIME = 0.1
-"""Time-out for writing a single value, which never waits [s]."""
+"""Time-out passed to the driver for writing a single value [s]; a value without a sample clock requires no wait."""
 _FULL = int(DAQmxErrors.SAMPLES_CAN_NOT_YET_BE_WRITTEN)
 
 
@@ -58,7 +58,8 @@ class Output:
     def write(self, volts: NDArray[np.float64]) -> None:
         """Append samples, shape (n,) [V]; waits for free space while playing.
 
-        Raises DriveUnderflow if the output has run out of samples, DeviceTimeout if no space becomes free in time.
+        Raises DriveUnderflow if the output has run out of samples, DeviceTimeout if no space becomes free in time, and
+        RigError if samples written before the start exceed the buffer.
         """
         if not self._started and self._prefilled + volts.size > self._buffer:
             raise RigError(
@@ -79,7 +80,7 @@ class Output:
         self._started = True
 
     def zero(self) -> None:
-        """Set the output to 0 V now. Fails if another task has reserved it."""
+        """Set the output to 0 V now. Raises RigError if another task has reserved it."""
         put_to_zero(self._connection, self._daq)
 
     def reset_device(self) -> None:
@@ -125,9 +126,9 @@ class Output:
 
 
 def put_to_zero(connection: Connection, daq: Daq) -> None:
-    """Set the output to 0 V now. Fails if a task has reserved it."""
+    """Set the output to 0 V now. Raises RigError if a task has reserved it."""
     with translated("setting the output to 0 V"):
-        # the task has no name: if a slow server creates it late, it must not block the next one
+        # the task has no name: a task that a slow server creates after the time-out must not block the next one
         task = library.task("", connection.options())
         try:
             _add_channel(task, daq)
@@ -142,7 +143,7 @@ def _add_channel(task: library.Task, daq: Daq) -> library.OutputChannel:
 
 
 def _transfer_early(channel: library.OutputChannel) -> str:
-    """Have the driver refill the onboard memory as soon as it is half empty; returns the setting in words.
+    """Make the driver refill the onboard memory as soon as it is half empty; returns a description of the setting.
 
     Even a deep onboard memory then adds no latency beyond the caller's lead.
     """

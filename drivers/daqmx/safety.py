@@ -22,7 +22,7 @@ from sim.errors import InvalidInput
 ENABLE_TASK = "rockbench_enable"
 
 _TIME = 0.1
-"""Time-out of writing or reading a line, which never waits [s]."""
+"""Time-out passed to the driver for writing or reading a line [s]; a line without a sample clock requires no wait."""
 _CHASSIS_EXPIRED = int(DAQmxErrors.CHASSIS_WATCHDOG_TIMER_EXPIRED)
 _EXPIRED = {int(DAQmxErrors.WRITE_FAILED_BECAUSE_WATCHDOG_EXPIRED), _CHASSIS_EXPIRED}
 """Error codes of a device that rejects a write because its watchdog has expired and opened the relay."""
@@ -31,8 +31,8 @@ _EXPIRED = {int(DAQmxErrors.WRITE_FAILED_BECAUSE_WATCHDOG_EXPIRED), _CHASSIS_EXP
 class EnableLine:
     """The digital line of the relay. After construction the relay is open and the task stopped.
 
-    `chassis_expired`: the chassis's watchdog has expired and opened the relay, and blocks the chassis until it is
-    reset.
+    `chassis_expired`: the watchdog of the chassis has expired and opened the relay, and the chassis is blocked until it
+    is reset.
     """
 
     def __init__(self, connection: Connection, line: str) -> None:
@@ -54,7 +54,9 @@ class EnableLine:
             self._writer.write_one_sample_one_line(True, _TIME)
 
     def cut(self) -> bool:
-        """Open the relay in one call, from any thread; returns whether the device confirmed it."""
+        """Open the relay in one call, from any thread; returns whether the device confirmed it, or its expired watchdog
+        has already opened the relay.
+        """
         try:
             self._writer.write_one_sample_one_line(False, _TIME)
         except DaqError as error:
@@ -84,7 +86,7 @@ class EnableLine:
         try:
             self._writer.write_one_sample_one_line(False, _TIME)
         except DaqError as error:
-            # the expired watchdog has opened it and rejects writes
+            # an expired watchdog has opened the relay, and the device rejects writes
             if code_of(error) not in _EXPIRED:
                 raise
             self.chassis_expired = code_of(error) == _CHASSIS_EXPIRED
@@ -93,7 +95,7 @@ class EnableLine:
 WATCHDOG_TASK = "rockbench_watchdog"
 
 _PER_TIMEOUT = 4
-"""Largest number of resets within one time-out."""
+"""Maximum number of resets within one time-out."""
 _REFUSED = {
     int(DAQmxErrors.WATCHDOG_TIMER_NOT_SUPPORTED): "{device} has no watchdog: remove hardware.daq.watchdog",
     int(DAQmxErrors.WATCHDOG_TIMEOUT_OUT_OF_RANGE_AND_NOT_SPECIAL_VAL): "it is outside the range of {device}",
@@ -104,9 +106,9 @@ class Watchdog:
     """Opens `line` unless reset within `timeout` seconds. Raises InvalidInput if the device has no watchdog or the
     time-out is too long for it.
 
-    The watchdog is on the device of the line, or on `chassis` if that device is a module. A chassis also sets `output`
-    to 0 V, and expires at once when its network connection is lost; after an expiry it does nothing until it is
-    reset (cDAQ-9185 User Manual, "Watchdog Timer").
+    The watchdog is that of the line's device, or that of `chassis` if the device is a module. The watchdog of a chassis
+    also sets `output` to 0 V, and expires at once when the chassis loses its network connection; after an expiry the
+    chassis rejects every operation until it is reset (cDAQ-9185 User Manual, "Watchdog Timer").
     """
 
     def __init__(self, connection: Connection, line: str, timeout: float, chassis: str | None, output: str) -> None:
@@ -152,7 +154,9 @@ class Watchdog:
         self._last_reset = time.monotonic()
 
     def reset(self) -> None:
-        """Reset the watchdog. Raises RigError if it has expired."""
+        """Reset the watchdog if at least a quarter of the time-out has passed since the last reset. Raises RigError if
+        it has expired.
+        """
         if time.monotonic() - self._last_reset >= self._interval:
             with translated("resetting the watchdog, which otherwise opens the enable line,"):
                 self._alive().reset_timer()

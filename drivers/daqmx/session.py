@@ -41,12 +41,12 @@ class DaqSession:
     the output; `hardware.daq.clock` must then name another terminal, or OnboardClock for a separate output clock, which
     starts with the inputs and stays synchronous if both clocks have the same timebase. There is no automatic fallback.
 
-    `pulses` are emitted at `daq.laser_marker` from the start of each run on. A run is `prepare`, `write` the first
-    samples, `start`, then `write` and `read` in turn, and `stop`. On any failure in between, the relay is opened and
-    the output set to zero before the error is raised. One thread at a time may use it; `cut`, `stop` and `close` may be
-    called from any other. The constructor brings the bench into a safe state before it checks anything. Raises
-    InvalidInput for unsupported settings and for a sample rate that the device cannot produce exactly; DeviceNotFound
-    when driver, server or device are missing or held by another program.
+    `pulses` are output at `daq.laser_marker`, beginning with the start of each run. A run is `prepare`, `write` the
+    first samples, `start`, then `write` and `read` in turn, and `stop`. On any failure in between, the relay is opened
+    and the output set to zero before the error is raised. One thread at a time may use a session; `cut`, `stop` and
+    `close` may be called from any other thread. The constructor brings the bench into a safe state before it checks
+    anything. It raises InvalidInput for unsupported settings and for a sample rate that the device cannot produce
+    exactly, and DeviceNotFound if the driver, the server or a device is missing or held by another program.
     """
 
     def __init__(
@@ -96,7 +96,7 @@ class DaqSession:
 
     @property
     def marker(self) -> str | None:
-        """The counter that emits the pulses; None without pulses or counter."""
+        """The counter that outputs the pulses; None without pulses or without a counter."""
         return None if self._tasks.marker is None else self._tasks.marker.counter
 
     @property
@@ -201,9 +201,9 @@ class DaqSession:
     def cut(self) -> bool:
         """Open the enable relay now, in one call, from any thread and in every state, even during a read.
 
-        Returns True if the device confirmed it, False if there is no enable line or the device did not respond; only
-        the emergency stop remains then. Never raises. The sample clock runs until `stop`; the watchdog is no longer
-        reset.
+        Returns True if the device confirmed it, or its expired watchdog has already opened the relay; False if there is
+        no enable line or the device did not respond, so that only the emergency stop remains. Never raises. The sample
+        clock runs until `stop`; the watchdog is no longer reset.
         """
         self._cut = True
         return self._tasks.relay is not None and self._tasks.relay.cut()
@@ -211,8 +211,8 @@ class DaqSession:
     def stop(self) -> None:
         """Open the relay, end the tasks, and set the output to 0 V.
 
-        Allowed in every state, and repeatedly. Attempts every step. Raises RigError at the end if the relay or the
-        output could not be set; the next call repeats all steps.
+        Allowed in every state, and repeatedly. Attempts every step, and raises RigError at the end if the relay or the
+        output could not be set; the next call then repeats all steps.
         """
         with self._lock:
             if self._state is _State.CLOSED:
@@ -284,9 +284,8 @@ class DaqSession:
 
 
 def _make_safe(connection: Connection, daq: Daq) -> None:
-    """Open the relay and set the output to 0 V, ignoring failures.
-
-    A persistent failure is reported when the tasks are created.
+    """Open the relay and set the output to 0 V. Failures are ignored, since a persistent one recurs when the tasks are
+    created.
     """
     with suppress(RigError):
         if daq.enable_line is not None:

@@ -1,7 +1,7 @@
-"""Removal of tasks that a dead client has left on a gRPC device server.
+"""Removal of tasks left on a gRPC device server by a client that has crashed.
 
-The server keeps tasks indefinitely, independently of connections. Their output holds its last value, their relay may be
-closed, and no other client can use the device.
+The server keeps tasks indefinitely, independently of connections. Their output holds its last value, the enable relay
+may be closed, and no other client can use the device.
 """
 
 from collections.abc import Iterable
@@ -24,7 +24,9 @@ from drivers.errors import DeviceNotFound
 _OURS = (ENABLE_TASK, HEARTBEAT_TASK, output.NAME, inputs.NAME, SAFETY_TASK, WATCHDOG_TASK)
 
 _WATCH = 0.6
-"""Time for which a running output is observed [s]; an active client writes every 0.2 s."""
+"""Time for which a running output is observed [s]; an active client writes once per block, which lasts 0.1 s by default
+and at most 0.2 s.
+"""
 
 _POLL = 0.05
 """Time between two readings [s]."""
@@ -36,7 +38,7 @@ _UNKNOWN = ("FAILED_PRECONDITION", "NOT_FOUND")
 def clear_stale(connection: Connection, devices: Iterable[str]) -> tuple[str, ...]:
     """Clear existing tasks that have this program's names, and then reset the devices; returns the names found.
 
-    Raises DeviceNotFound while another client drives the output. An idle client cannot be distinguished from a dead
+    Raises DeviceNotFound while another client drives the output. An idle client cannot be distinguished from a crashed
     one: it loses its tasks, and its next `prepare` raises ConnectionLost.
     """
     if connection.server is None:

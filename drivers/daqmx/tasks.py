@@ -52,7 +52,7 @@ class Tasks:
         self.safety: SafetyInputs | None = None
         self.was_reset = False
         self.ready_delay = None if daq.amplifier_ready is None else daq.amplifier_ready.delay
-        """Longest delay from closing the enable line to amplifier ready [s]; None if the two are independent."""
+        """Longest time from closing the enable line to amplifier ready [s]; None if the two are independent."""
         with ExitStack() as made:
             if daq.enable_line is not None:
                 self.relay = EnableLine(connection, daq.enable_line)
@@ -167,7 +167,7 @@ class Tasks:
             failures.append(RigError("the watchdog had expired: the chassis was reset; open a new session"))
 
     def clear(self) -> None:
-        """Release all tasks, once, if the driver responds and no other client owns them."""
+        """Release all tasks, unless another client owns them; failures are ignored. May be called repeatedly."""
         with self._made, suppress(RigError):
             if not self.inputs.is_owner():
                 self._made.pop_all()
