@@ -42,7 +42,7 @@ def laser_scaling(measuring_range: float, load: float) -> AnalogueScaling:
 
 
 def require_input_range(item: str, input_range: float, load: float) -> None:
-    """Raise InvalidInput about `item` if an input of +-`input_range` [V] does not cover the measuring range.
+    """Raise InvalidInput for `item` if an input of +-`input_range` [V] does not cover the measuring range.
 
     The converter may saturate within the reserve beyond the measuring range; values there are then invalid.
     """
@@ -64,7 +64,7 @@ _MEASURED = {
 
 
 class Scaling(Protocol):
-    """Scaling of one input within the converter's range: volts = coefficients[0] + coefficients[1] counts + ..."""
+    """Scaling of one input: volts = coefficients[0] + coefficients[1] counts + ..., and the range of valid counts."""
 
     @property
     def coefficients(self) -> tuple[float, ...]:
@@ -139,8 +139,8 @@ def _analogue(
 
 
 def serial_laser(name: str, measuring_range: float, polarity: int, device: str, faults: Mapping[int, str]) -> Channel:
-    """Channel of a laser read serially: counts relative to mid range; `faults` gives the meanings of counts outside the
-    range.
+    """Channel of a laser on its serial line: counts relative to mid range; `faults` gives the meanings of counts
+    outside the range.
     """
     scale, valid = polarity * count_size(measuring_range), (-MID_RANGE, MID_RANGE)
     return Channel(name, "displacement", "m", scale, 0.0, valid, device, faults=faults)

@@ -20,13 +20,11 @@ from drivers.hardware.parameters import Hardware
 from sim.process_lock import LockHeld, ProcessLock
 
 FOLDER = "ROCKBENCH_LOCKS"
-"""Environment variable that names the folder of the locks; the default folder is shared by all users of this
-machine.
-"""
+"""Environment variable with the folder of the locks; the default folder is shared by all users of this machine."""
 
 
 def devices_of(hardware: Hardware) -> list[str]:
-    """The devices that a rig opens: the DAQ devices of the drive and of the digital lines, each module after its
+    """The devices that a rig locks: the DAQ devices of the drive and of the digital lines, each module after its
     chassis, and the serial ports. A chassis is locked too, because resetting it resets all its modules.
     """
     daq = hardware.daq
@@ -34,7 +32,7 @@ def devices_of(hardware: Hardware) -> list[str]:
     once = dict[str, str]()
     for terminal in (daq.output, *daq.digital_lines.values()):
         for name in _chassis_and_device(terminal):
-            # a device must be locked once only, and its name is case-insensitive
+            # a device must be locked only once, and its name is case-insensitive
             once.setdefault(name.casefold(), f"{name}{where}")
     ports = [given.port for _, given in hardware.serial_lasers if given.port is not None]
     return [*once.values(), *(os.path.realpath(port) if port.startswith("/") else port for port in ports)]
@@ -48,7 +46,7 @@ def _chassis_and_device(terminal: str) -> list[str]:
 
 
 def _same_address(server: str) -> str:
-    """Address of a server, with one name for this machine."""
+    """Address of a server, with 127.0.0.1 in place of other loopback names."""
     host, colon, port = server.rpartition(":")
     return f"127.0.0.1{colon}{port}" if host.casefold() in ("localhost", "::1", "[::1]") else server
 

@@ -19,7 +19,7 @@ class CalibratedInput(AnalogInput):
     @model_validator(mode="after")
     def _check_calibration(self) -> "CalibratedInput":
         if self.sensitivity == 0.0:
-            raise InvalidInput("sensitivity", self.sensitivity, "volts per unit, not 0")
+            raise InvalidInput("sensitivity", self.sensitivity, "it must be a number of volts per unit other than 0")
         if abs(self.zero) >= self.range:
             raise InvalidInput("zero", self.zero, f"it must be within the input's range of {self.range:g} V")
         return self
@@ -205,12 +205,12 @@ class Hardware(Parameters):
 
     @property
     def analogue_lasers(self) -> tuple[tuple[str, LaserInput], ...]:
-        """The analogue inputs of the lasers; none with the serial connection."""
+        """Channel name and input of the lasers with the analogue connection; empty with the serial one."""
         return () if self.lasers.connection == "serial" else self._lasers
 
     @property
     def serial_lasers(self) -> tuple[tuple[str, LaserInput], ...]:
-        """The lasers on serial ports; none with the analogue connection."""
+        """Channel name and input of the lasers with the serial connection; empty with the analogue one."""
         return self._lasers if self.lasers.connection == "serial" else ()
 
     @property

@@ -29,9 +29,11 @@ from drivers.timebase.marking import Pulses, golden_pulses
 _SETTLING = 0.05
 """Time between the last pulse and the first sample of a run [s]."""
 _CHUNK = 0.1
-"""Duration of a read during the pulses [s], short compared with the time-outs of watchdog and heartbeat relay."""
+"""Length of a read during the pulses [s], short compared with the time-outs of watchdog and heartbeat relay."""
 _FIRST_READINGS = 20
-"""Number of readings of the sample clock after its start, which bound it to within a fraction of a call's duration."""
+"""Number of readings of the sample clock after its start, which bound the clock to within a fraction of the duration of
+a reading.
+"""
 
 _GOLDEN = 0.6180339887498949
 """Phase step between consecutive readings [periods]; its multiples are evenly distributed over a period."""
@@ -45,9 +47,9 @@ class HardwareRig(RigBase):
     """DAQ and lasers as one rig. The sample clock starts with the first block that is read.
 
     Samples are corrected for the delays of filters and multiplexers. A block is complete when its most delayed input
-    is, so the largest delay is added to `lead`, the number of drive samples that must be queued. `further` are
-    additional sensors. Raises InvalidInput or RigError if the bench differs from the configuration; all devices are
-    then closed.
+    is, so the largest delay is added to `lead`, the number of drive samples that must be queued beyond a block.
+    `further` are additional sensors. Raises InvalidInput or RigError if the bench differs from the configuration; all
+    devices are then closed.
     """
 
     def __init__(self, hardware: Hardware, *, lead: int, further: Sequence[FurtherChannel] = ()) -> None:
@@ -190,11 +192,11 @@ class HardwareRig(RigBase):
             )
 
     def _observe_clock(self, tracks: Tracks, times: int) -> None:
-        """Read the sample clock between two readings of the machine's clock, which bound it. A separate process
-        supplies the readings; without one, they are made here.
+        """Read the sample clock between two readings of the machine's clock, which bound it. If a separate process
+        supplies readings, these are used; otherwise the clock is read `times` times here.
 
-        The readings are spread over the sample period: right after a block all would have the same phase, and the
-        bounds would be no tighter than one period.
+        The readings are spread over the sample period: if all were made right after a block, they would have the same
+        phase, and the bounds would be no tighter than one period.
         """
         watched = [] if self._watch is None else self._watch.take()
         for before, count, after in watched:

@@ -22,12 +22,12 @@ from drivers.timebase.sensor_track import SensorTrack
 from sim.errors import InvalidInput
 
 _SHARE, _RESERVE = 0.5, 0.1
-"""Part of the drive still queued during which a block waits for late values: all but 0.1 s, and at least half. The rest
-is the time for the next write.
+"""Longest wait for late values, as a fraction of the time for which the queued drive lasts, or as that time less a
+reserve [s], whichever is longer. The rest of the time is left for the next write.
 """
 _LONGEST, _LEAST = 0.4, 0.05
-"""Delay of a block [s] up to which it waits for late values, shorter than the default of `limits.late`; and the longest
-wait [s] of a block that is already later, which allows for values received during a stall of the program.
+"""Delay up to which a block waits for late values [s], shorter than the default of `limits.late`; and the longest wait
+of a block that is already later [s], so that values received during a stall of the program are included.
 """
 
 
@@ -65,7 +65,7 @@ class ClockedSensor(Protocol):
 
     @property
     def silent(self) -> bool:
-        """Whether values have been absent for so long that blocks no longer wait for the sensor."""
+        """Whether no values have arrived for so long that blocks no longer wait for the sensor."""
         ...
 
     def start(self) -> None:
@@ -131,7 +131,7 @@ class Tracks:
         self._clock = SampleClock(sample_rate)
 
     def observe(self, before: float, count: int, after: float) -> None:
-        """Add a reading: the sample clock was at `count` between two times of the machine's clock [s].
+        """Add a reading: `count` samples had been taken at some instant between two times of the machine's clock [s].
 
         Raises RigError before a run.
         """
@@ -141,8 +141,8 @@ class Tracks:
         """Counts at `n` samples from `first` on, shape (n, n_tracks); waits for late values.
 
         `lead` is the number of drive samples queued beyond the block. The wait ends in time for the next write,
-        however late the block already is. Values that have not arrived by then are marked as late; a silent
-        sensor is not awaited. Raises ConnectionLost, and RigError before a run.
+        however late the block already is. Values that have not arrived by then are marked as late; there is no wait for
+        a silent sensor. Raises ConnectionLost, and RigError before a run.
         """
         last = (first + n - 1) / self._sample_rate
         self._await(last, now() + longest_wait(lead / self._sample_rate, self._since(last)))
@@ -150,7 +150,7 @@ class Tracks:
         return np.column_stack(placed)
 
     def mark(self, pulses: Pulses, lead: int) -> tuple[str, ...]:
-        """Align the sensors by pulses that have switched them off; returns the names of those that were not aligned.
+        """Align the sensors by pulses that have switched their beams off; returns the names of those not aligned.
 
         Waits for late values as `counts` does.
         """
@@ -192,7 +192,7 @@ class Tracks:
                 self._take()
 
     def _since(self, seconds: float) -> float:
-        """Time since a sample [s], given on the sample clock; 0 before the first reading of that clock."""
+        """Time that has passed since `seconds` of the sample clock [s]; 0 before the first reading of that clock."""
         passed = float(self._running.seconds(np.array([now()]))[0]) - seconds
         return passed if passed > 0.0 else 0.0
 
@@ -219,8 +219,8 @@ class Tracks:
 
 
 def longest_wait(lead: float, passed: float) -> float:
-    """Longest wait for late values of a block [s] whose last sample was `passed` [s] ago, with a drive queued for
-    `lead` [s] from then on.
+    """Longest wait for late values [s] of a block whose last sample was taken `passed` [s] ago; from then on, the
+    queued drive lasts for `lead` [s].
     """
     left = max(lead - passed, 0.0)
     return min(max(_SHARE * left, left - _RESERVE), max(_LONGEST - passed, _LEAST))
