@@ -24,7 +24,9 @@ class Reply:
     def __init__(self) -> None:
         self.complete = False
         self.prompt_in_value = False
-        """Whether a possible prompt was received that may be part of a value; it is accepted if nothing follows."""
+        """Whether bytes like a prompt were received that may be part of a value; they are accepted as the prompt if no
+        certain one follows.
+        """
         self.rest = b""
         """Bytes after the prompt."""
         self._text = b""
@@ -146,7 +148,7 @@ class Dialogue:
             raise self.gone(error) from error
 
     def drain(self, quiet: float, limit: float) -> bool:
-        """Discard input until the line has been quiet for `quiet` [s]; returns False if it is not within `limit`
+        """Discard input until the line has been quiet for `quiet` [s]; returns False if this takes longer than `limit`
         [s].
         """
         begun = last = time.monotonic()

@@ -32,23 +32,24 @@ class Layout:
 def additional_signals(rate: float, baud: int) -> tuple[str, ...]:
     """The additional signals that fit on the line at `rate` [1/s]: counter and time stamp, or the counter alone.
 
-    Raises InvalidInput if the counter does not fit, since a lost value would go unnoticed without it.
+    Raises InvalidInput if the counter does not fit, since without it a lost value would go unnoticed.
     """
     for signals in _WISHES:
         if (1 + len(_values(signals))) * rate * BITS_PER_VALUE <= baud:
             return signals
     most = baud / (2 * BITS_PER_VALUE)
     allowed = (
-        f"{baud} baud allow at most {most:.0f} measurements/s with the counter;"
+        f"{baud} baud allows at most {most:.0f} measurements/s with the counter;"
         " choose a lower rate, or a higher baud rate in the sensor's web interface"
     )
     raise InvalidInput("hardware.lasers.rate", rate, allowed)
 
 
 def layout_in(who: str, reported: list[str], signals: tuple[str, ...]) -> Layout:
-    """The layout that the sensor reports by GETOUTINFO_RS422, in the order of its output (manual, p. 109).
+    """The layout of a measurement, from the signals `reported` by GETOUTINFO_RS422, in the order of output (manual, p.
+    109).
 
-    Raises RigError if it does not begin with the distance or lacks one of `signals`.
+    Raises RigError if the layout does not begin with the distance or lacks one of `signals`.
     """
     values = _values(tuple(reported))
     needed = _values(signals)
@@ -117,8 +118,8 @@ class Assembler:
     def feed(self, words: Words) -> Frames:
         """The measurements completed by `words`.
 
-        Raises ConnectionLost if counter and time stamp jump permanently, or if only distances are received: the sensor
-        was switched off in between.
+        Raises ConnectionLost if the counter or the time stamp has jumped and continues from there, or if only distances
+        are received: the sensor was switched off in between.
         """
         code, counter, ticks = self._blocks(words)
         if not code.size:
@@ -161,7 +162,7 @@ class Assembler:
             )
 
     def _trusted(self, counter: NDArray[np.int64], ticks: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Mask of the measurements that continue their predecessor; initially only after `_LOCK` consecutive ones."""
+        """Mask of the measurements that continue the previous one; initially only after `_LOCK` consecutive ones."""
         before = self._neighbour or (int(counter[0]), int(ticks[0]))
         follows = _steps(counter, before[0], COUNTER_TURN) == 1
         if self._layout.time is not None:

@@ -31,8 +31,8 @@ NETWORK = "socket://"
 
 
 class SocketPort(protocol_socket.Serial):
-    """A serial line on a network port, with the number of received bytes; the library states only whether there are
-    any, so that a stream would be read byte by byte.
+    """A serial line on a network port that reports the number of received bytes; the library's class reports only
+    whether there are any, so that a stream would be read byte by byte.
     """
 
     @property
@@ -50,10 +50,10 @@ def listed_ports() -> list[str]:
 
 
 def open_port(name: str, port: str, baud: int) -> Serial:
-    """Open `port` for `name` with exclusive access, 8 data bits, no parity, one stop bit (manual, p. 84).
+    """Open `port` with exclusive access, 8 data bits, no parity, one stop bit (manual, p. 84).
 
-    The baud rate and exclusive access do not apply to a network port. Raises DeviceNotFound if the port is absent, held
-    by another program, not permitted or not a serial port.
+    `name` identifies the sensor in error messages. The baud rate and exclusive access do not apply to a network port.
+    Raises DeviceNotFound if the port is absent, held by another program, not permitted or not a serial port.
     """
     if port.startswith(NETWORK):
         try:

@@ -56,7 +56,7 @@ def info_in(lines: list[str]) -> SensorInfo | None:
 _PROBE = 0.3
 """Time-out for an answer at one baud rate [s]."""
 _QUIET = 0.05
-"""Time without input after which the line is quiet [s]: adapters delay data by up to 16 ms."""
+"""Time without input after which the line counts as quiet [s]: adapters delay data by up to 16 ms."""
 _SILENCE = "OUTPUT NONE"
 _TRIES = 3
 """Number of attempts per command: bytes sent at other baud rates corrupt the first command at the right rate."""
@@ -66,7 +66,7 @@ _DRAINED = 1.0
 
 @dataclass(frozen=True)
 class Answer:
-    """Baud rate of an answer, identity of the sensor, and its refusal of the command, if any."""
+    """Answer of a sensor: its baud rate, its identity, and its refusal of the command, if any."""
 
     baud: int
     info: SensorInfo
@@ -76,8 +76,9 @@ class Answer:
 def silenced(dialogue: Dialogue, item: str, baud: int | None) -> Answer:
     """Switch the output of the sensor off, at `baud` or at the detected baud rate.
 
-    A running stream may cause the loss of the first command. Raises DeviceNotFound if nothing responds, InvalidInput
-    about `item` if the sensor responds at a baud rate other than `baud`, CommandRefused if it continues to stream.
+    The first command may be lost in a running stream, so several attempts are made. Raises DeviceNotFound if nothing
+    responds, InvalidInput for `item` if the sensor responds at a baud rate other than `baud`, CommandRefused if it
+    continues to stream.
     """
     first, *others = BAUDS if baud is None else (baud, *(other for other in BAUDS if other != baud))
     answer = _answer(dialogue, first, _SILENCE, tries=3) or _search(dialogue, others, _SILENCE)
@@ -158,7 +159,7 @@ def find_lasers(ports: Sequence[str] | None = None) -> list[FoundLaser]:
     """The sensors on `ports`, by default on all ports that the system lists.
 
     Sends only queries, at each possible baud rate, so that the settings of a sensor do not change and a stream
-    continues. Takes about 4 s, since all ports are searched in parallel.
+    continues. Takes about 4 s for any number of ports, which are searched in parallel.
     """
     names = list(dict.fromkeys(listed_ports() if ports is None else ports))
     if not names:

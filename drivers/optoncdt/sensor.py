@@ -21,12 +21,13 @@ _FIXED = ("AVERAGE NONE", "TRIGGER NONE", "OUTHOLD NONE", "OUTREDUCEDEVICE NONE"
 def require_sensor(
     name: str, who: str, info: SensorInfo, measuring_range: float, serial_number: str | None = None
 ) -> None:
-    """Raise DeviceNotFound for another model, InvalidInput if measuring range [m] or serial number is not as
-    configured.
+    """Raise DeviceNotFound for a model that is not supported, InvalidInput if the measuring range [m] or the serial
+    number is not as configured.
     """
     if not info.supported:
         raise DeviceNotFound(
-            f"{who} is a {info.model}, whose data format is not supported; connect an ILD1420, or correct the port"
+            f"{who} is of model {info.model}, whose data format is not supported; connect an ILD1420, or correct the "
+            "port"
         )
     if not isclose(info.measuring_range, measuring_range, rel_tol=1e-4):
         allowed = f"{who} has a range of {info.measuring_range:g} m: correct this value, or the port of this laser"
@@ -60,7 +61,7 @@ def configure(dialogue: Dialogue, rate: float, baud: int) -> tuple[Layout, bool]
 def _require_no_mastering(dialogue: Dialogue) -> None:
     """Raise RigError if mastering is on, since it shifts the zero without an indication in the stream (manual, p. 65).
 
-    The query is not documented. A sensor without it is sent MASTERMV NONE, which is documented (p. 108).
+    The query is not documented. To a sensor that rejects it, MASTERMV NONE is sent, which is documented (p. 108).
     """
     remedy = "set MASTERMV NONE in its web interface"
     try:
@@ -83,7 +84,7 @@ _RATES = "sensors support 250, 500, 1000, 2000 and 4000 1/s, newer ones also 800
 
 
 def _set_rate(dialogue: Dialogue, rate: float) -> bool:
-    """Set the rate, which the command takes in kHz, and read it back: a rate that the sensor did not adopt would go
+    """Set the rate, in kHz in the command, and read it back: if the sensor did not adopt the rate, this would go
     unnoticed and make the time base wrong.
 
     Returns False if the sensor lacks the query, which the manual does not document; the values must then be counted.
@@ -112,8 +113,8 @@ def _set_rate(dialogue: Dialogue, rate: float) -> bool:
 _LOCK_TIME = 2.0
 """Longest wait for the first accepted value after the stream is switched on [s]."""
 _SILENT_PERIODS, _SILENT_TIME = 10.0, 0.4
-"""Number of periods and time [s] without data after which a sensor is silent. The system may pass on received bytes by
-a thread of normal priority, which busy processors delay by tenths of a second.
+"""Number of periods and time [s] without data after which a sensor counts as silent. The operating system may deliver
+received bytes in a thread of normal priority, which is delayed by tenths of a second while the processors are busy.
 """
 _QUIET, _DRAINED = 0.05, 0.5
 _COUNTING, _COUNTED = 0.5, 0.2
@@ -178,7 +179,7 @@ class SerialLaser:
         return now() - self._stream.last_arrival > max(_SILENT_PERIODS / self._rate, _SILENT_TIME)
 
     def start(self) -> None:
-        """Switch the stream on, with index and time at zero, and return when values are accepted.
+        """Switch the stream on, with index and time beginning at zero; returns as soon as values are accepted.
 
         Raises DeviceTimeout if they do not arrive in the configured format, InvalidInput if they arrive at another
         rate, ConnectionLost if the port has disappeared.

@@ -23,9 +23,9 @@ _KEPT = 60.0
 class Readings:
     """Measurements of one laser, each array of shape (n,).
 
-    `index` counts them since the start of the stream, with gaps where some were lost. `time` is the time of measurement
-    on the sensor's clock [s]. `code` holds the raw words. `arrival` is the time on the machine's clock [s] at which
-    their bytes had been read, an upper bound on their arrival.
+    `index` is the number of the measurement since the start of the stream, with gaps where values were lost. `time` is
+    the time of the measurement on the sensor's clock [s], `code` the raw word, and `arrival` the time on the machine's
+    clock [s] by which its bytes had been read, an upper bound on their arrival.
     """
 
     index: NDArray[np.int64]
@@ -38,8 +38,8 @@ class Readings:
 
 
 class Stream:
-    """Values of the sensor on `line` until `end`; `dialogue` parses its replies. Methods may be called from any
-    thread.
+    """Values of the sensor on `line`, until `end`; `dialogue` parses the sensor's replies. Methods may be called from
+    any thread.
     """
 
     def __init__(self, dialogue: Dialogue, line: Line, layout: Layout, rate: float) -> None:

@@ -150,7 +150,7 @@ def test_as_much_is_asked_for_as_the_line_carries(rate: float, baud: int, signal
 
 
 def test_a_rate_that_the_line_does_not_carry_is_refused() -> None:
-    with pytest.raises(InvalidInput, match=r"115200 baud allow at most 1920 measurements/s .* higher baud rate"):
+    with pytest.raises(InvalidInput, match=r"115200 baud allows at most 1920 measurements/s .* higher baud rate"):
         additional_signals(4000, 115_200)
 
 

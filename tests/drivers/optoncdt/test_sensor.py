@@ -70,7 +70,7 @@ def test_a_fast_sensor_on_the_factorys_baud_rate_sends_its_counter_only() -> Non
         (
             replaced(SILENCED, GETINFO=INFO.replace(b"ILD1420-200", b"ILD1320-200")),
             DeviceNotFound,
-            "is a ILD1320-200, .*connect an ILD1420",
+            "is of model ILD1320-200, .*connect an ILD1420",
         ),
         (
             replaced(SILENCED, GETINFO=INFO.replace(b"200.00mm", b" 50.00mm")),
