@@ -24,7 +24,7 @@ _IDLE_TURN = 0.02
 
 
 class EmulatedBench:
-    """A `Plant` around the virtual bench, advanced by every read, and by a separate thread in between.
+    """A `Plant` around the virtual bench, which is advanced by every read, and by a separate thread between reads.
 
     One tick is one sample of the virtual bench; `clock_error` is the relative error of the tick rate, in addition to
     that of the bench's own sample clock.
@@ -128,8 +128,8 @@ class EmulatedBench:
             self._subscriber = subscriber
 
     def connect_laser(self, storey: int, live: Callable[[], bool]) -> None:
-        """Let `live` state whether the analogue output of the laser on storey 1 or 2 follows its target; while it is
-        false, the output supplies the error current.
+        """Connect the analogue output of the laser on storey 1 or 2: it follows the laser's target while `live` returns
+        True, and otherwise supplies the error current.
         """
         with self.lock:
             self._outputs[1 + storey] = live
@@ -160,7 +160,9 @@ class EmulatedBench:
         return start * rest * rest + end * place * place
 
     def perform(self, work: OperatorTask, amount: float | None) -> None:
-        """Carry out an operator's task. Raises RigError while the amplifier is enabled."""
+        """Carry out an operator's task. Raises RigError while the amplifier is enabled, and the errors of
+        `SpecimenHandling.after`.
+        """
         with self.lock:
             if self._enabled:
                 raise RigError(

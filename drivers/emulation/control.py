@@ -27,7 +27,7 @@ class ControlServer:
     """Server on a free local port; the constructor starts it.
 
     Each connection has its own thread, so that handlers may block and run concurrently. A handler refuses a command by
-    raising.
+    raising an error.
     """
 
     def __init__(self, handlers: Mapping[str, Handler]) -> None:
@@ -107,7 +107,7 @@ class ControlServer:
 
 
 def _requests(lines: BinaryIO) -> Iterator[bytes]:
-    """Received lines; a line that is too long is truncated."""
+    """Received lines; a line longer than `_LONGEST` is truncated to one byte more, so that it is refused."""
     while line := lines.readline(_LONGEST + 1):
         part = line
         while part and not part.endswith(b"\n"):
@@ -126,8 +126,8 @@ _PATIENCE = 60.0
 
 
 def ask(address: str, command: str, /, *, patience: float = _PATIENCE, **arguments: object) -> Any:
-    """Send a command to the emulated laboratory at `address` (`host:port`); returns its reply, waiting up to `patience`
-    [s].
+    """Send a command to the emulated laboratory at `address` (`host:port`), and return the result in its reply; waits
+    up to `patience` [s].
 
     Raises RigError if the command is refused, ConnectionLost without a connection, DeviceTimeout if there is no reply
     in time, InvalidInput for an invalid address.
@@ -161,7 +161,7 @@ def place_of(address: str) -> tuple[str, int]:
 
 
 def _line(connection: socket.socket, deadline: float) -> bytes:
-    """The reply, without its line ending. Raises OSError, or TimeoutError when the deadline passes."""
+    """The reply, with its line ending. Raises OSError, or TimeoutError when the deadline passes."""
     received = b""
     while not received.endswith(b"\n"):
         if (left := deadline - time.monotonic()) <= 0.0:

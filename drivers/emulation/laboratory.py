@@ -105,7 +105,7 @@ class Laboratory:
         self.daq.start()
 
     def late(self) -> dict[str, float]:
-        """The lasers whose values this computer has sent late since the last call, with the longest delay [s]."""
+        """Longest delay [s] of each laser whose values this computer has sent late since the last call."""
         found = {f"laser {storey}": laser.take_lateness() for storey, laser in enumerate(self.lasers, 1)}
         return {name: delay for name, delay in found.items() if delay > LATE}
 
@@ -134,21 +134,23 @@ class Laboratory:
         self.bench.perform(OperatorTask(arguments["work"]), arguments.get("amount"))
 
     def _switch_lasers(self, edges: NDArray[np.float64]) -> None:
-        """Switch the lasers at the edges of the counter, which is wired to their on/off inputs: high opens these."""
+        """Switch the lasers at the edges of the counter, which is wired to their on/off inputs: a high level opens
+        them.
+        """
         for laser in self.lasers:
             laser.switch(edges)
 
     def _laser(self, arguments: Mapping[str, Any]) -> None:
-        """Inject a fault of the laser on `storey` by a method of EmulatedLaser, given by name, with its `arguments`."""
+        """Call the method of EmulatedLaser named by `fault`, for the laser on `storey`, with `arguments`."""
         laser = self.lasers[int(arguments["storey"]) - 1]
         _FAULTS_OF_LASER[arguments["fault"]](laser, *arguments.get("arguments", ()))
 
     def _daq(self, arguments: Mapping[str, Any]) -> None:
-        """Inject a fault of the DAQ by a method of DaqServer, given by name, with its `arguments`."""
+        """Call the method of DaqServer named by `fault`, with `arguments`."""
         _FAULTS_OF_DAQ[arguments["fault"]](self.daq, *arguments.get("arguments", ()))
 
     def _safety(self, arguments: Mapping[str, Any]) -> None:
-        """Change the enable chain by a method of SafetyChain, given by name, with its `arguments`."""
+        """Call the method of SafetyChain named by `fault`, with `arguments`."""
         _FAULTS_OF_SAFETY[arguments["fault"]](self.safety, *arguments.get("arguments", ()))
 
     def _truth(self, arguments: Mapping[str, Any]) -> dict[str, Any]:  # noqa: ARG002 - the signature of a handler

@@ -47,7 +47,7 @@ class Plant(Protocol):
         ...
 
     def wire(self, output: Output) -> None:
-        """Connect the drive output; the drive is zero before."""
+        """Connect the drive output; until then the drive is zero."""
         ...
 
     def enable(self, closed: bool) -> None:
@@ -70,7 +70,7 @@ T = TypeVar("T", bound=np.generic)
 
 
 class History(Generic[T]):
-    """The newest `capacity` rows of a growing array, by row number; rows never change."""
+    """The newest `capacity` rows of a growing array, addressed by their row numbers; rows never change."""
 
     def __init__(self, capacity: int, columns: int, dtype: type[T]) -> None:
         self._rows: NDArray[T] = np.zeros((capacity, columns), dtype=dtype)

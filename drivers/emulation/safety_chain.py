@@ -126,7 +126,7 @@ class SafetyChain:
         self._change(lambda: setattr(self, "_tripped", False))
 
     def break_wire(self, name: str) -> None:
-        """Break the wire of an input, or of the "heartbeat": its input reads low."""
+        """Break the wire of an input, which then reads low, or of the "heartbeat", whose relay then opens."""
         if name not in (*INPUTS, "heartbeat"):
             raise RigError(f"wire {name!r} is refused: the wires are {', '.join(INPUTS)} and heartbeat")
         self._change(lambda: self._broken.add(name))

@@ -16,7 +16,9 @@ from sim.virtual_bench import VirtualBenchParameters
 Connection = Literal["serial", "socket", "analogue"]
 """Connection of the lasers; `socket` is the serial line on a network port."""
 Device = Literal["usb", "crio", "cDAQ-9174", "cDAQ-9185", "cRIO-9045", "cRIO-9049", "PCIe-6351", "USB-6351"]
-"""Selectable devices: two sets with a calibration polynomial, USB-6363 and cRIO-9045 with NI 9239, and `zoo`'s."""
+"""Selectable devices: `usb` (USB-6363) and `crio` (cRIO-9045 with NI 9239), each with a calibration polynomial, and
+those of `zoo`.
+"""
 
 _VALUES = 4
 """Number of values per measurement on the serial line: distance, counter, and the two halves of the time stamp."""
@@ -36,8 +38,8 @@ class Site:
     """Devices of a laboratory and the terminals in use.
 
     `inputs` are the terminals of displacement, acceleration and lasers; `contacts` are the digital inputs in the order
-    of the safety chain's INPUTS, none on a device without digital inputs. `counter` switches the lasers; None if there
-    is none. `range` is the largest voltage that all inputs can measure [V].
+    of `safety_chain.INPUTS`, empty on a device without digital inputs. `counter` switches the lasers; None if there is
+    none. `range` is the largest voltage that all inputs can measure [V].
     """
 
     devices: tuple[DeviceModel, ...]

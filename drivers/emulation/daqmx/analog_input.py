@@ -31,9 +31,8 @@ _AUTOMATIC_BUFFER = ((100.0, 1_000), (10_000.0, 10_000), (1.0e6, 100_000), (floa
 class AnalogInput:
     """`Job` of an analogue input task.
 
-    `changed` guards it, and wakes threads that wait for samples.
-
-    The counter of acquired samples counts those transferred to the computer, in whole packets of `packet` samples.
+    `changed` guards it, and wakes threads that wait for samples. The number of acquired samples includes only those
+    transferred to the computer, in whole packets of `packet` samples.
     """
 
     def __init__(self, plant: Plant, changed: threading.Condition, packet: int = 1) -> None:
@@ -67,7 +66,7 @@ class AnalogInput:
 
     @property
     def engines(self) -> tuple[str, ...]:
-        """The timing engines of its chassis or device."""
+        """The timing engines of the chassis or device of the inputs."""
         return self.inputs[0].device.input_engines
 
     @property
@@ -116,7 +115,8 @@ class AnalogInput:
     def delays(self) -> NDArray[np.float64]:
         """Delay of each input's samples [s], shape (channels,); all 0 without a clock.
 
-        It is the delay of the converter's filter, and negative for later inputs of a multiplexer.
+        It is the delay of the converter's filter, less the part that the device removes, and negative for the later
+        inputs of a multiplexer.
         """
         if self.clock is None:
             return np.zeros(len(self.inputs))
@@ -173,10 +173,10 @@ class AnalogInput:
         pass
 
     def read(self, n: int, timeout: float, run: int) -> Seen:
-        """The plant's counts at the next `n` samples of this run; fewer after a time-out.
+        """The plant's counts at the next `n` samples of the run `run`, shape (n, channels); fewer after a time-out.
 
-        Shape (n, channels). Waits; called without holding `changed`. Raises DaqmxFailure if samples were lost, or the
-        run has ended.
+        Waits for the samples; called without holding `changed`. Raises DaqmxFailure if samples were lost, or the run
+        has ended.
         """
         with self._reading:
             with self._changed:

@@ -1,4 +1,4 @@
-"""Analogue output tasks: immediate single values, or buffered samples that are played once each."""
+"""Analogue output tasks: immediate single values, or buffered samples, each of which is played once."""
 
 import threading
 from collections.abc import Callable
@@ -75,7 +75,7 @@ class AnalogOutput:
 
     @property
     def engines(self) -> tuple[str, ...]:
-        """The timing engines of its chassis or device."""
+        """The timing engines of the chassis or device of the outputs."""
         return self.outputs[0].device.output_engines
 
     @property
@@ -135,7 +135,7 @@ class AnalogOutput:
         if self.clock is None:
             return
         if self.regeneration != RegenerationMode.DONT_ALLOW_REGENERATION.value:
-            raise NotEmulated("an output that plays its samples over and over")
+            raise NotEmulated("an output that regenerates its samples")
         if self.written == 0:
             raise DaqmxFailure(
                 DAQmxErrors.OUTPUT_BUFFER_EMPTY,
@@ -176,7 +176,7 @@ class AnalogOutput:
     def write(self, volts: NDArray[np.float64], timeout: float) -> int:
         """Append samples, shape (n, channels) [V]; waits for free space.
 
-        Returns the number of samples written. Raises DaqmxFailure with the number of samples accepted.
+        Returns the number of samples written per channel. Raises DaqmxFailure with the number written before the error.
         """
         self._require_in_range(volts)
         deadline = deadline_after(timeout)

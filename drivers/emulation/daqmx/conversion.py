@@ -15,7 +15,7 @@ _LARGEST_DIVISOR = 31
 _OVERSAMPLING = 256.0
 """Ticks of the master timebase per sample at the highest rate (NI-9234 Specifications, "Data Rate Range")."""
 _PADDING = 10.0e-6
-"""Settling time between the channels of a multiplexer [s] (cDAQ-9183 User Manual, "AI Convert Clock Signal Behavior for
+"""Settling time between two channels of a multiplexer [s] (cDAQ-9183 User Manual, "AI Convert Clock Signal Behavior for
 Analog Input Modules", "Scanned Modules"; M and X Series alike)."""
 
 

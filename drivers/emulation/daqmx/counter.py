@@ -10,14 +10,14 @@ from drivers.emulation.daqmx.errors import NotEmulated
 from drivers.emulation.plant import Plant
 
 Edges = Callable[[NDArray[np.float64]], None]
-"""Receives the times [s] of all edges of a train, shape (2 n,), the first one rising; none when the output stops."""
+"""Receiver of the times [s] of all edges of a train, shape (2 n,), the first one rising; empty when it stops."""
 _TIMEBASE = 100.0e6
 """Fastest internal timebase of the counters [1/s] (X Series User Manual, "Counters")."""
 
 
 @dataclass(frozen=True)
 class PulseChannel:
-    """A counter of a device: name, durations of its pulses [s], and what is wired to its output terminal."""
+    """A counter of a device: name, timing of its pulses [s], and the receiver wired to its output terminal."""
 
     name: str
     device: str

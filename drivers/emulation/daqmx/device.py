@@ -18,7 +18,7 @@ _STRAIGHT: Mapping[int, tuple[float, ...]] = MappingProxyType({})
 
 
 Seen = NDArray[np.int16 | np.int32 | np.float64]
-"""Counts of the plant; interpolated, and not integer, between two of its ticks."""
+"""Counts of the plant; between two of its ticks they are interpolated and not integers."""
 START, CLOCK = "StartTrigger", "SampleClock"
 """Signals of a timing engine."""
 
@@ -75,8 +75,8 @@ class AnalogOutputs:
 class DeviceModel:
     """A device, a chassis, or a module in a `chassis`.
 
-    `lines` is the number of lines at port 0 that can be outputs, `input_lines` the number of those that can be inputs;
-    groups of `direction_group` consecutive lines share one direction. `watchdog` is the longest time-out [s] of its
+    `lines` is the number of lines at port 0 that can be outputs, `input_lines` the number that can be inputs; groups of
+    `direction_group` consecutive lines share one direction. `watchdog` is the longest time-out [s] of its
     watchdog, None without one; the watchdog of a chassis acts on the outputs of its modules. `input_engines` and
     `output_engines` are the timing engines of analogue inputs and outputs, in the order of their numbers; a module has
     the engines of its chassis.

@@ -17,11 +17,11 @@ from sim.sensors import Converter
 
 
 class Driver:
-    """Devices, tasks and reservations; `changed` guards all of it.
+    """Devices, tasks and reservations, all guarded by `changed`.
 
-    It outlives every client. `drive` is the output wired to the plant, None if no output is connected. `wires` are
-    connected to the digital lines. `converter` produces the plant's counts. For `output_clock_error` and `packet` see
-    `DaqServer`.
+    The driver outlives every client. `drive` is the output wired to the plant, None if no output is connected. `wires`
+    are connected to the digital lines. `converter` produces the plant's counts. For `output_clock_error` and `packet`
+    see `DaqServer`.
     """
 
     def __init__(
@@ -55,9 +55,9 @@ class Driver:
             plant.wire(self.terminals[drive])
 
     def create(self, name: str, *, may_attach: bool, may_create: bool) -> tuple[Task, bool]:
-        """The task `name`, and whether it is new; "" generates a name.
+        """The task `name`, and whether it is new; for "", a name is generated.
 
-        Raises SessionExists and SessionMissing.
+        Raises SessionExists or SessionMissing if `may_attach` or `may_create` forbids it.
         """
         with self.changed:
             if name in self._tasks:
@@ -103,7 +103,7 @@ class Driver:
                 task.state = State.RESERVED
 
     def start(self, task: Task) -> None:
-        """Start a task, or arm it if it has a trigger. Tasks triggered by its start signal start with it."""
+        """Start a task, or arm it if it has a trigger. Armed tasks that wait for its start signal start with it."""
         with self.changed:
             task.require_stopped()
             job = task.required_job
@@ -169,9 +169,9 @@ class Driver:
         self.changed.notify_all()
 
     def expire(self, parts: Sequence[DeviceModel], lines: dict[str, bool], volts: dict[str, float]) -> None:
-        """Set the outputs of devices whose watchdog has expired, and reject writes to them.
+        """Set the outputs of devices whose watchdog has expired, and reject writes to their lines.
 
-        A chassis refuses every operation until it is reset (cDAQ-9185 User Manual, "Watchdog Timer").
+        A chassis rejects every operation until it is reset (cDAQ-9185 User Manual, "Watchdog Timer").
         """
         whole = len(parts) > 1
         error = DAQmxErrors.WRITE_FAILED_BECAUSE_WATCHDOG_EXPIRED
@@ -184,7 +184,7 @@ class Driver:
             self.terminals[output].hold(value)
 
     def lose_network(self) -> None:
-        """Simulate a lost network connection to every chassis; watchdogs configured for it expire."""
+        """Simulate a lost network connection to every chassis; watchdogs configured to do so expire."""
         with self.changed:
             for task in self._tasks.values():
                 if isinstance(task.job, Watchdog):
@@ -201,7 +201,7 @@ class Driver:
                 )
 
     def _require_direction(self, task: Task, job: LineTask) -> None:
-        """Raise DaqmxFailure if another task uses lines of one direction group in the other direction."""
+        """Raise DaqmxFailure if another task uses lines of the same direction group in the opposite direction."""
         for other in self._reserved.values():
             theirs = other.job
             if other is task or not isinstance(theirs, LineTask) or theirs.outwards == job.outwards:
@@ -223,7 +223,7 @@ class Driver:
                 )
 
     def _require_terminals(self, job: Job) -> None:
-        """Raise DaqmxFailure for a trigger or clock source that no device has."""
+        """Raise DaqmxFailure for a trigger or clock source that the job's devices and their chassis do not have."""
         own = {self.catalogue.device(name).clockwork for name in job.devices}
         devices = [device for device in self.catalogue.devices if device.clockwork in own]
         known = {terminal.lower() for device in devices for terminal in device.terminals}

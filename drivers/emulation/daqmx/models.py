@@ -18,7 +18,7 @@ _BEND = 1.0e-4
 
 
 def x_series(name: str = "Dev1", *, simulated: bool = False, calibrated: bool = False) -> DeviceModel:
-    """A multifunction device at the USB port, after the data sheet of the USB-6363.
+    """A multifunction device on a USB port, after the data sheet of the USB-6363.
 
     If `calibrated`, one input has a calibration polynomial with offset, slope error, and square and cubic terms.
     """
@@ -49,7 +49,7 @@ def compact_rio(name: str = "cRIO1", *, simulated: bool = False, calibrated: boo
     """A cRIO-9045 with two NI 9239 (inputs), NI 9263 (outputs), NI 9485 (relays) and NI 9421 (digital inputs).
 
     Modules are devices: `cRIO1Mod1/ai0`. The controller has a timing engine for each slot: `/cRIO1/it0/StartTrigger`.
-    DAQmx cannot set a watchdog on a CompactRIO. `calibrated` as in `x_series`, for the first module.
+    DAQmx supports no watchdog on a CompactRIO. `calibrated` applies to the first module, as in `x_series`.
     """
     controller, *modules = build("cRIO-9045", ("9239", "9239", "9263", "9485", "9421"))
     assert modules[0].inputs is not None

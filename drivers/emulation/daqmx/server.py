@@ -1,6 +1,6 @@
-"""Server: devices wired to a plant, at a network address, with planned faults."""
+"""Server at a network address: devices wired to a plant, and faults on request."""
 
-# ruff: noqa: ARG002 - gRPC gives every call a context, needed or not
+# ruff: noqa: ARG002 - gRPC passes a context to every call
 
 import threading
 import time
@@ -34,7 +34,7 @@ _GRPC = cast(Any, grpc)
 
 
 class Faults:
-    """Planned faults."""
+    """Faults requested for later calls."""
 
     def __init__(self) -> None:
         self._codes: dict[str, deque[int]] = {}
@@ -60,7 +60,7 @@ class Faults:
             self._changed.notify_all()
 
     def strike(self, call: str) -> None:
-        """Apply a planned fault to a call: delay it, raise DaqmxFailure, or do nothing."""
+        """Apply the requested faults, if any, to a call: delay it, or raise DaqmxFailure."""
         with self._changed:
             while (remaining := self._silent_until - time.monotonic()) > 0.0:
                 self._changed.wait(remaining)
@@ -171,8 +171,8 @@ class DaqServer:
     defaults are the first of each on the devices. `wires` replaces the wiring of the digital lines when more than the
     relay is connected. `converter` produces the plant's counts. With `credentials` the server is encrypted, otherwise
     plain. `output_clock_error` is the relative excess rate of an output that does not follow the inputs' sample clock;
-    the inputs' sample counter advances in steps of `packet`, as with packet transfer. Raises InvalidInput when the
-    address is not available.
+    the inputs' sample counter advances in steps of `packet`, as with packet transfer. Raises InvalidInput if the
+    address is not available, or the devices lack `drive` or `enable_line`.
     """
 
     def __init__(
@@ -261,7 +261,7 @@ class DaqServer:
         self._faults.stall(seconds)
 
     def lose_network(self) -> None:
-        """Simulate a lost connection between this server and its chassis; watchdogs configured for it expire."""
+        """Simulate a lost connection between this server and its chassis; watchdogs configured to do so expire."""
         self._driver.lose_network()
 
     def vanish(self) -> None:

@@ -48,7 +48,7 @@ class Job(Protocol):
         ...
 
     def engage(self, is_free: Callable[[str], bool]) -> None:
-        """Choose resources as the driver does when it reserves the task; `is_free` states whether one is available."""
+        """Choose resources as the driver does when it reserves the task; `is_free` returns whether one is available."""
         ...
 
     def check(self) -> None:

@@ -21,7 +21,7 @@ def deadline_after(timeout: float) -> float:
 
 
 def wait_until(changed: threading.Condition, instant: float, deadline: float) -> bool:
-    """Wait until `instant`, `deadline` or a notification; returns False if the deadline passes first."""
+    """Wait until `instant`, `deadline` or a notification; returns False at once if the deadline has passed."""
     now = time.monotonic()
     if now >= deadline:
         return False
@@ -66,10 +66,10 @@ class SampleClock:
 
 
 def sample_clock(asked: float, highest: float, tick_rate: float, samples: int, error: float = 0.0) -> SampleClock:
-    """The clock of a device for `asked` samples per second: the next higher rate that it supports.
+    """The clock of a device for `asked` samples per second: the lowest supported rate not below it.
 
-    All rates are the tick rate divided by an integer, at most `highest`, as with delta-sigma converters (NI 9239 data
-    sheet).
+    All supported rates are the tick rate divided by an integer, at most `highest`, as with delta-sigma converters (NI
+    9239 data sheet).
     """
     if not 0.0 < asked <= highest * (1.0 + _SAME):
         raise DaqmxFailure(

@@ -1,4 +1,4 @@
-"""The watchdog of a device: unless it is reset in time, the lines go to their safe states."""
+"""The watchdog of a device: unless it is reset in time, the outputs are set to their expiration states."""
 
 import threading
 import time
@@ -93,7 +93,9 @@ class Watchdog:
 
     @property
     def trips_on_loss(self) -> bool:
-        """Whether it expires when the chassis loses its network connection. Raises DaqmxFailure unless on a chassis."""
+        """Whether the watchdog expires when its chassis loses the network connection. Raises DaqmxFailure for a device
+        that is not a chassis.
+        """
         self._require_network()
         return self._trips
 
@@ -107,7 +109,7 @@ class Watchdog:
         self._expired = False
 
     def lose_network(self) -> None:
-        """Simulate a lost network connection: the watchdog expires at once if it is configured for it."""
+        """Simulate a lost network connection: the watchdog expires at once if it is configured to do so."""
         with self._changed:
             if self._trips and self._deadline is not None:
                 self._deadline = time.monotonic()
@@ -124,7 +126,7 @@ class Watchdog:
     def check(self) -> None:
         pass
 
-    def begin(self, tick: int) -> None:  # noqa: ARG002 - it has a clock of its own
+    def begin(self, tick: int) -> None:  # noqa: ARG002 - the watchdog uses the wall clock
         self._expired = False
         if self.device.simulated or self.timeout == -1.0:
             return
@@ -144,7 +146,7 @@ class Watchdog:
         pass
 
     def reset(self) -> None:
-        """Restart the timer."""
+        """Restart the timer. Raises DaqmxFailure if the watchdog has expired."""
         with self._changed:
             if self._expired:
                 raise DaqmxFailure(

@@ -1,6 +1,7 @@
 """National Instruments devices by name, with specifications and rules from NI's documents.
 
-The tables are taken from the documents alone, independently of the assumptions of this program's drivers.
+Except where noted, the tables are taken from the documents alone, independently of the assumptions of this program's
+drivers.
 """
 
 from collections.abc import Sequence
@@ -46,7 +47,7 @@ MODULES: dict[str, DeviceModel] = {
         inputs=AnalogInputs(4, (10.0,), 1.0e5, 1.0e5, simultaneous=True, wirings=Wirings.DIFFERENTIAL),
     ),
     # NI-9234 Specifications: 24 bits, 5 V, internal master timebase of 13.1072 MHz; the constant of its input delay is
-    # cited without page number, since no copy of that page was available
+    # the one assumed in `drivers.daqmx.delays`, since no NI document that gives it was found
     "9234": DeviceModel(
         "",
         "NI 9234",
@@ -104,7 +105,7 @@ def _cdaq(product: str, watchdog: float | None = None) -> DeviceModel:
 
 
 def _crio(product: str) -> DeviceModel:
-    """A controller. DAQmx cannot set a watchdog on it (NI-DAQmx help lists none for CompactRIO)."""
+    """A controller, for which DAQmx supports no watchdog (NI-DAQmx help lists none for CompactRIO)."""
     return DeviceModel("cRIO1", product, _CRIO, input_engines=_CRIO_INPUTS, output_engines=_CRIO_OUTPUTS)
 
 
@@ -118,7 +119,8 @@ CHASSIS: dict[str, tuple[int, DeviceModel]] = {
 
 
 def _x_series(product: str, *, transfer_condition: bool) -> DeviceModel:
-    """An NI 6351: a multiplexed converter of 1.25 MS/s, 1 MS/s over several channels (6368 User Manual, table 4-5).
+    """An NI 6351: a multiplexed converter of 1.25 MS/s, 1 MS/s shared by several channels (6368 User Manual, table
+    4-5).
 
     Its watchdog acts on digital lines only (X Series User Manual, "Digital Output", "Watchdog Timer"). It has four
     counters (X Series User Manual, "Counters").

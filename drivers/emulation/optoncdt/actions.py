@@ -102,7 +102,7 @@ class Actions:
 
     def _info(self, request: Request) -> list[str]:
         _no_parameters(request)
-        # existing clients expect one line before the name
+        # existing clients expect one line, the echo, before the name
         return [request.text, *self._identity.lines] if self._sensor.settings.echo else self._identity.lines
 
     def _outputs(self, request: Request) -> list[str]:

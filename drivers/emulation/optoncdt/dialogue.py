@@ -24,7 +24,7 @@ _MOST = 4096
 """Bytes per read."""
 _CAPACITY = 640 * 1024
 """Bytes that Linux keeps for a serial port whose reader is late (TTYB_DEFAULT_MEM_LIMIT); for a pseudo-terminal, only
-16 KiB, a third of a second at full rate.
+16 KiB, a third of a second of 4000 measurements/s with counter and time stamp.
 """
 
 
@@ -127,7 +127,7 @@ _OPEN_TO_ALL = ("ECHO", "LANGUAGE")
 
 
 class Dialogue:
-    """Executes commands on `sensor` and answers them; `rates` are the measuring rates of the sensor [1/s]."""
+    """Executes the commands received for `sensor` and returns its answers; `rates` are its measuring rates [1/s]."""
 
     def __init__(self, sensor: Sensor, actions: Actions, rates: tuple[float, ...]) -> None:
         self._sensor, self._actions = sensor, actions
@@ -136,7 +136,7 @@ class Dialogue:
         self._waiting: Mastering | None = None
 
     def receive(self, received: bytes, now: float) -> bytes:
-        """Output due at the host time `now` [s], after `received` has arrived.
+        """Answers due at the host time `now` [s], at which `received` has arrived.
 
         A command ends with a line feed, with or without carriage return; input during start-up is ignored.
         """

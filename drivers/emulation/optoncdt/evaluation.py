@@ -1,4 +1,4 @@
-"""Conversion of distances to codes, with optical errors, moving mean, mastering and hold, and of codes to bytes."""
+"""Codes of distances, with optical errors, moving mean, mastering and hold, and the bytes of codes on the line."""
 
 from enum import IntEnum
 
@@ -134,7 +134,9 @@ class Evaluation:
 
 
 def faults_of(shares: Array) -> NDArray[np.int64]:
-    """The fault of each measurement, shape (n,); 0 where the distance is within the measuring range or its reserve."""
+    """The fault of each measurement, shape (n,), from `shares`, distances as fractions of the measuring range; 0 within
+    the range and its reserve.
+    """
     faults = np.zeros(shares.size, dtype=np.int64)
     if not (np.abs(shares - 0.5) <= 0.5 + _RESERVE).all():
         faults[shares < -_RESERVE] = Fault.TOO_CLOSE

@@ -29,7 +29,7 @@ class Line:
     def __init__(self, random: Generator) -> None:
         self._random = random
         self.lose = 0
-        """Number of next bytes to lose."""
+        """Number of bytes to be lost next."""
         self.probability = 0.0
         """Probability of the loss of a byte."""
         self.garbage = 0
@@ -80,10 +80,11 @@ _TARGETS = {"too close": Fault.TOO_CLOSE, "too far": Fault.TOO_FAR, "none": Faul
 class EmulatedLaser:
     """A sensor that measures `sight` with the errors of the simulated `laser`, on the serial port `port`.
 
-    The constructor switches it on, and it serves its line from `start()` on. `as_found` are the settings at power-up;
-    by default it does not stream. `clock_error` is the relative error of its clock, by default that of `laser`. `rates`
-    [1/s], `password` and `boot_time` [s] differ between versions of the sensor or are not documented. Every method may
-    be called from any thread. With `network`, the port is a socket, to which baud rates do not apply.
+    The constructor switches the sensor on; its line is served from `start()` on. `as_found` are the settings at
+    power-up, with which it does not stream by default. `clock_error` is the relative error of its clock, by default
+    that of `laser`. `rates` [1/s], `password` and `boot_time` [s] differ between versions of the sensor or are not
+    documented. Every method may be called from any thread. With `network`, the port is a socket, to which baud rates do
+    not apply.
 
     Raises DeviceNotFound on Windows, which has no pseudo-terminals, unless `network` is set.
     """
@@ -127,7 +128,7 @@ class EmulatedLaser:
 
     @property
     def port(self) -> str:
-        """Path of the serial port that a client opens."""
+        """Path of the serial port, or address of the socket, that a client opens."""
         return self._terminal.port
 
     @property
@@ -187,7 +188,7 @@ class EmulatedLaser:
             self._line.garbage = count
 
     def silence(self, seconds: float) -> None:
-        """Suppress all output to the client for `seconds`; the sensor continues to measure."""
+        """Suppress all output to the client for `seconds` [s]; the sensor continues to measure."""
         with self._lock:
             self._line.silent_until = time.monotonic() + seconds
 
@@ -214,7 +215,7 @@ class EmulatedLaser:
         self._sensor.switching = times
 
     def target(self, place: Literal["too close", "too far", "none"] | None) -> None:
-        """Replace the target by one that is too close, too far or missing; None restores the original sight."""
+        """Replace the target by one that is too close, too far or missing; None restores the original target."""
         with self._lock:
             self._sensor.target = _TARGETS[place]
 
@@ -246,7 +247,7 @@ class EmulatedLaser:
         connected, baud = self._terminal.connected, self._sensor.settings.baud
         read_at = self._terminal.baud or baud
         if read_at != baud:
-            # at the wrong rate no command is recognised, and the received bytes corrupt the next one
+            # at the wrong rate no command is recognised, and the bytes received corrupt the next command
             received = b"\xff" * len(received)
         stream = self._sensor.stream(now)
         answer = self._dialogue.receive(received, now)

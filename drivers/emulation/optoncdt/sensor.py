@@ -35,7 +35,7 @@ class Zero:
 class Grid:
     """Exposures at equal intervals of the sensor's clock, which has the relative error `clock_error`.
 
-    Times are host times [s]. Exposures are numbered from power-up, through changes of the rate.
+    Times are host times [s]. Exposures are numbered from power-up; the numbers continue through changes of the rate.
     """
 
     def __init__(self, rate: float, clock_error: float, origin: float) -> None:
@@ -88,7 +88,7 @@ _STATES = {
     Fault.TOO_CLOSE: 2 << 16 | 1 << 5,
     Fault.TOO_FAR: 2 << 16 | 1 << 6,
 }
-"""Status words: the light is green (1) or red (2); bits 2, 5 and 6 state the reason (manual of the optoNCDT 1420, p.
+"""Status words: the light is green (1) or red (2); bits 2, 5 and 6 give the reason (manual of the optoNCDT 1420, p.
 66).
 """
 
@@ -96,7 +96,7 @@ Codes = NDArray[np.int64]
 
 
 class Sensor:
-    """Measures `sight` from `now` on; `as_found` are its settings at power-up. Times are host times [s]."""
+    """Measures the target `sight` from the host time `now` [s] on; `as_found` are its settings at power-up."""
 
     def __init__(
         self, sight: Sight, laser: Laser, clock_error: float, random: Generator, as_found: Settings, now: float
@@ -132,7 +132,7 @@ class Sensor:
         self.settings = settings
 
     def stream(self, now: float) -> NDArray[np.uint8]:
-        """The bytes produced since the last call, in whole blocks."""
+        """The bytes output since the last call, in whole blocks."""
         settings = self.settings
         if settings.output != "RS422" or settings.trigger != "NONE":
             self._following = self.grid.end(now)
@@ -174,7 +174,7 @@ class Sensor:
             return np.full(times.size, np.nan), np.full(times.size, self.target)
         shares = self._optics.shares(self._sight.displacement(times))
         faults = faults_of(shares)
-        # another thread may replace it
+        # another thread may replace the attribute
         switching = self.switching
         if switching.size:
             dark = np.searchsorted(switching, times, side="right") % 2 == 1

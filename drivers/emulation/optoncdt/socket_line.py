@@ -36,7 +36,7 @@ class SocketLine(SerialLine):
 
     @property
     def baud(self) -> None:
-        """The baud rate of the client; None, because a socket transmits none."""
+        """Always None, because a socket does not transmit the client's baud rate."""
 
     def read(self) -> bytes:
         """Bytes sent by the client."""

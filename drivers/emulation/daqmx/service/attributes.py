@@ -22,7 +22,7 @@ from drivers.emulation.daqmx.models import unflattened
 from drivers.emulation.daqmx.service.base import AboutAttribute, AboutTask, Service, attribute_of, unsupported
 from drivers.emulation.daqmx.task import Job
 
-# ruff: noqa: ARG002 - gRPC gives every call a context, needed or not
+# ruff: noqa: ARG002 - gRPC passes a context to every call
 
 
 class _AboutChannel(AboutTask, AboutAttribute, Protocol):

@@ -22,7 +22,7 @@ class AboutTask(Protocol):
 
 
 class AboutAttribute(Protocol):
-    """A request about an attribute: NI's clients send its number, others may send the enumeration."""
+    """A request about an attribute: NI's clients send its number, others may send the enumeration value."""
 
     @property
     def attribute(self) -> int: ...

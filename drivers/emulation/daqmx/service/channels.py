@@ -17,11 +17,13 @@ from drivers.emulation.daqmx.models import unflattened
 from drivers.emulation.daqmx.service.base import Service
 from drivers.emulation.daqmx.task import Job, Task
 
-# ruff: noqa: ARG002 - gRPC gives every call a context, needed or not
+# ruff: noqa: ARG002 - gRPC passes a context to every call
 
 
 def covering_range(ranges: Sequence[float], minimum: float, maximum: float, what: str) -> float:
-    """The narrowest of the device's ranges [V] that covers the limits. Raises DaqmxFailure if none does."""
+    """The narrowest of the device's `ranges` [V] that covers the limits. Raises DaqmxFailure if none does; `what` names
+    the property in the error.
+    """
     wanted = max(abs(minimum), abs(maximum))
     if minimum >= maximum or wanted > max(ranges):
         raise DaqmxFailure(

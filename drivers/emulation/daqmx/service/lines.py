@@ -1,6 +1,6 @@
 """Calls that manage tasks, read and write digital lines, and control watchdogs."""
 
-# ruff: noqa: ARG002 - gRPC gives every call a context, needed or not
+# ruff: noqa: ARG002 - gRPC passes a context to every call
 
 from collections.abc import Mapping
 
@@ -90,7 +90,7 @@ class TaskService(Service):
         return pb.GetTaskAttributeBoolResponse(value=self._task(request).state in (State.IDLE, State.RESERVED))
 
     def opened(self, name: str, behavior: int) -> tuple[Task, bool]:
-        """The requested session, and whether it is new."""
+        """The requested session, and whether it is new. Raises the errors of `Driver.create`."""
         return self._driver.create(
             name,
             may_attach=behavior != SESSION_INITIALIZATION_BEHAVIOR_INITIALIZE_NEW,
@@ -176,7 +176,7 @@ class WatchdogService(TaskService):
             if level == Level.NO_CHANGE.value:
                 continue
             if level not in _LEVELS:
-                raise NotEmulated("a line without any level")
+                raise NotEmulated("an expiration state other than high, low or no change")
             states[device.line_names[k]] = _LEVELS[level]
         self._task(request).doing(Watchdog).expire_to(states)
         return pb.CfgWatchdogDOExpirStatesResponse()

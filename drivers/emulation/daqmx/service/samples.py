@@ -17,7 +17,7 @@ from drivers.emulation.daqmx.models import flattened
 from drivers.emulation.daqmx.service.base import AboutTask, Service, attribute_of, unsupported
 from drivers.emulation.daqmx.task import Task
 
-# ruff: noqa: ARG002 - gRPC gives every call a context, needed or not
+# ruff: noqa: ARG002 - gRPC passes a context to every call
 
 
 class _ReadRequest(AboutTask, Protocol):
@@ -134,7 +134,7 @@ def _packed(
     return array
 
 
-# ruff: noqa: ARG002 - gRPC gives every call a context, needed or not
+# ruff: noqa: ARG002 - gRPC passes a context to every call
 
 
 class WritingService(Service):

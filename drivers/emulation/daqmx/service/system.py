@@ -1,6 +1,6 @@
 """Calls about the driver and its devices."""
 
-# ruff: noqa: ARG002 - gRPC gives every call a context, needed or not
+# ruff: noqa: ARG002 - gRPC passes a context to every call
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol, TypeVar

@@ -1,6 +1,6 @@
 """Calls about sample clocks, start triggers and buffers."""
 
-# ruff: noqa: ARG002 - gRPC gives every call a context, needed or not
+# ruff: noqa: ARG002 - gRPC passes a context to every call
 
 from nidaqmx._stubs import nidaqmx_pb2 as pb
 from nidaqmx.constants import AcquisitionType, Edge
@@ -19,7 +19,7 @@ Sampled = AnalogInput | AnalogOutput
 
 
 def _sampled(task: Task) -> Sampled:
-    """The job of a task that has a sample clock, or could have one."""
+    """The job of a task that can have a sample clock. Raises DaqmxFailure for other kinds of task."""
     job = task.required_job
     return job if isinstance(job, AnalogOutput) else task.doing(AnalogInput)
 
@@ -40,7 +40,7 @@ class TimingService(Service):
     def CfgSampClkTiming(self, request: pb.CfgSampClkTimingRequest, context: object) -> pb.CfgSampClkTimingResponse:
         job = self._changeable(request)
         if (request.sample_mode_raw or request.sample_mode) != AcquisitionType.CONTINUOUS.value:
-            raise NotEmulated("a clock for a finite number of samples")
+            raise NotEmulated("a sample clock with finite acquisition")
         own = request.source in ("", "OnboardClock")
         if not own and isinstance(job, AnalogInput):
             raise NotEmulated("an input task on an external sample clock")
@@ -56,7 +56,7 @@ class TimingService(Service):
 
     def CfgImplicitTiming(self, request: pb.CfgImplicitTimingRequest, context: object) -> pb.CfgImplicitTimingResponse:
         if (request.sample_mode_raw or request.sample_mode) != AcquisitionType.FINITE.value:
-            raise NotEmulated("a counter output without end")
+            raise NotEmulated("a counter output with continuous timing")
         self._task(request).doing(CounterOutput).pulses = request.samps_per_chan
         return pb.CfgImplicitTimingResponse()
 
