@@ -64,9 +64,7 @@ class FurtherChannel(CalibratedInput):
 
     @property
     def simulated(self) -> PlacedSensor:
-        """The sensor's model on the simulated bench. Raises InvalidInput for a quantity or place that is not
-        simulated.
-        """
+        """The sensor's model on the simulated bench. Raises InvalidInput for an unsupported quantity or place."""
         if self.measures not in SIMULATED or self.place == "elsewhere":
             allowed = f"on the simulated bench, it must be {', '.join(SIMULATED)} of the table or a storey"
             raise InvalidInput("measures", f"{self.measures} of {self.place}", allowed)

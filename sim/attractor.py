@@ -36,15 +36,16 @@ each corrects.
 """
 
 REPEATED, ALIKE = 0.01, 0.05
-"""Largest changes of a peak over one period of a motion that counts as periodic: relative to the largest peak, and
-relative to the range of the peaks. The second is needed because a slow spiral also returns close to earlier states.
+"""Largest change of a peak over one period of a motion that counts as periodic: relative to the largest peak, and
+relative to the range of the peaks. The second limit is needed because a slow spiral also returns close to earlier
+states.
 """
 
 
 @dataclass(frozen=True, eq=False)
 class Attractor:
-    """Peaks of u1 and drift [m] in the last `KEPT` cycles, shape (KEPT, 2). `fallen` is the number of cycles before the
-    block fell, in which case `peaks` has no rows; None if it did not fall.
+    """Long-term motion: `peaks` of u1 and drift [m] in each of the last `KEPT` cycles, shape (KEPT, 2). `fallen` is the
+    number of cycles before the block fell, in which case `peaks` has no rows; None if it did not fall.
     """
 
     peaks: Array

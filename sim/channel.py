@@ -13,7 +13,7 @@ STOREYS = ("laser_1", "laser_2")
 """Names of the channels by measured quantity, whatever the instrument: table and coil, first and second storey."""
 
 Counts = NDArray[np.int16 | np.int32]
-"""Integer types of a converter's counts: 16 bits for most converters, 32 bits for 24-bit ones."""
+"""Array of a converter's counts: of 16-bit integers for most converters, of 32-bit integers for 24-bit ones."""
 
 _NO_FAULTS: Mapping[int, str] = MappingProxyType({})
 
@@ -26,8 +26,8 @@ class Channel:
 
     `quantity` is the measured quantity, such as "displacement" or "acceleration". `valid` is the inclusive range of
     counts of valid measurements: outside it the converter is saturated or the sensor signals an error, and the sample
-    becomes NaN. `faults` gives the meaning of individual counts outside it. The `delay` [s] of the channel, with
-    standard uncertainty `delay_uncertainty` [s], has already been removed from its samples. `higher` are the small
+    becomes NaN. `faults` gives the meaning of individual counts outside that range. The `delay` [s] of the channel,
+    with standard uncertainty `delay_uncertainty` [s], has already been removed from its samples. `higher` are the small
     higher-order coefficients of a converter whose own calibration is a polynomial.
     """
 
@@ -51,7 +51,7 @@ class Channel:
 
     @property
     def limits(self) -> tuple[float, float]:
-        """Smallest and largest value [unit] that the channel can report."""
+        """Smallest and largest value [unit] of the valid counts."""
         low, high = sorted(self._converted(np.array(self.valid, dtype=np.float64)))
         return float(low), float(high)
 

@@ -1,8 +1,9 @@
 """Linear map from cycle to cycle near a steady rocking motion, with the fundamental of the drive as its input.
 
 Cycle n lasts from one section to the next. At its beginning, the state deviates from the orbit by x_n, shape (8,). In
-its first part, the control blends from c_(n-1) to c_n. Each is a complex share of the table's acceleration, written as
-a vector of its real and imaginary parts. With y_n, the Fourier coefficients of u1 and drift over the cycle,
+its first part, the control changes smoothly from c_(n-1) to c_n. A control is a complex number relative to the
+amplitude of the table's acceleration, written as a vector of its real and imaginary parts. With y_n, the Fourier
+coefficients of u1 and drift over the cycle,
 
     x_(n+1) = M x_n + B1 c_(n-1) + B0 c_n
     y_n     = y* + C x_n + D1 c_(n-1) + D0 c_n.
@@ -23,7 +24,7 @@ OBSERVED = 3
 """Number of harmonics, of u1 and of the drift each, that the vector y contains."""
 
 STEP = 1e-4
-"""Step of the finite differences: for states relative to their scales, for the control as a share."""
+"""Step of the finite differences: for states relative to their scales, for the control as defined above."""
 
 RIGID = Shaker(moving_mass=1e8, friction=0.0, voltage_limit=1e12, current_limit=1e12)
 """Shaker of a table that the block does not move."""
@@ -72,8 +73,8 @@ class CycleMap:
     def excitation(self, cycles: int) -> tuple[NDArray[np.complex128], float]:
         """Controls of successive cycles, shape (cycles,), after which the state deviates along the slowest pair only.
 
-        The largest control has the magnitude 1. Also returns the relative deviation of y that they cause, per unit of
-        that control. The phase of the deviation is the one that is reached with the smallest controls.
+        The largest control has the magnitude 1. Also returns the relative deviation of y that these controls cause. Its
+        phase is the one that is reached with the smallest controls.
         """
         multipliers, vectors = np.linalg.eig(self.transition)
         pair = vectors[:, int(np.argmax(np.abs(multipliers)))]
@@ -115,7 +116,7 @@ def cycle_map(fixed: Orbit, shaker: Shaker | None, harmonics: int, blend: float 
     done = np.minimum(middle / blend, 1.0)
     done *= done * (3.0 - 2.0 * done)
     volts = table.gain * fixed.amplitude / complex(table.frequency_response(fixed.omega, fixed.specimen.mass))
-    # a share c gives the table the acceleration Im(A c exp(i phi))
+    # a control c gives the table the additional acceleration Im(A c exp(i phi))
     carrier = -1j * volts * np.exp(1j * (orbit.phase + 2.0 * np.pi * middle))
     orders = np.arange(1, OBSERVED + 1)
     angles = np.arange(TICKS) * (2.0 * np.pi / TICKS)

@@ -1,8 +1,8 @@
 """Motions and gain coefficients of an ensemble of specimens, for Monte Carlo or first-order uncertainties.
 
 The steady motions of the members are near a known one, so that Newton's method finds all of them together, starting at
-its section with its Jacobian. Members that are farther away are reached one by one, by continuation. Under a record,
-each member is a separate run.
+the section of the known motion with its Jacobian. Members that are farther away are reached one by one, by
+continuation. Under a record, each member is a separate run.
 """
 
 from collections.abc import Sequence
@@ -46,7 +46,7 @@ def simulate_many(
     overturning_angle: float = pi / 2,
     scheduler: str | None = None,
 ) -> list[Motion]:
-    """Call `simulate` for many runs, on all processors, and return the results in order.
+    """Results of `simulate` for many runs, in order, computed on all processors.
 
     A single specimen, excitation, state or window applies to all runs. Everything is checked before the first run
     starts. `scheduler` is that of `sim.sweep.sweep`.
@@ -142,10 +142,10 @@ def steady_gains(
 ) -> Floats:
     """alpha_1 and alpha_2 of m specimens on the branches of n orbits, shape (n, m, 2), computed on all processors.
 
-    `members[i]` are the specimens at `orbits[i]`, under its frequency and amplitude. `bare_amplitude` [m/s2] is the
-    amplitude of the test without block, if different. The gains are NaN where a member does not have the motion of the
-    branch: its block does not rest, or continuation does not reach its orbit. `done` is called as parts of the work are
-    completed.
+    `members[i]` are the specimens near `orbits[i]`, at the frequency and amplitude of that orbit. `bare_amplitude`
+    [m/s2] is the amplitude of the test without block, if different. The gains are NaN where a member does not have the
+    motion of the branch: its block does not rest, or continuation does not reach its orbit. `done` is called as parts
+    of the work are completed.
     """
     every = [(orbit, specimen) for orbit, own in zip(orbits, members, strict=True) for specimen in own]
     parts = max(processors(scheduler), len(every) // CHUNK)

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 
 class CauseCode(StrEnum):
-    """Reasons for the end of a run that have no exception type."""
+    """Reasons for the end of a run that can occur without a RockbenchError."""
 
     UNKNOWN = "unknown"
     REQUEST = "request"
@@ -30,7 +30,8 @@ class Interruption(Exception):
 
 @dataclass(frozen=True)
 class Cause:
-    """Cause of the end or refusal of a run: the `error_code` of an error, or a `CauseCode`. Advice depends only on it.
+    """Cause of the end or refusal of a run: `code` is the `error_code` of an error, or a `CauseCode`. The advice to the
+    operator depends only on the cause.
 
     `subject` is the item concerned: the quantity of a limit, the names of safety inputs, the name of a value, the kind
     of a request ("stop", "abort" or "halt").
@@ -46,7 +47,8 @@ UNKNOWN = Cause()
 class RockbenchError(Exception):
     """Error with a one-line message that states the problem, the rejected input and the remedy.
 
-    `error_code` identifies the type to programs (docs/errors.md); a type without its own inherits that of its parent.
+    `error_code` identifies the type to programs (docs/errors.md); a type that does not define it inherits that of its
+    parent.
     """
 
     error_code: ClassVar[str] = "error"

@@ -1,4 +1,4 @@
-"""Optional parts of the installation that a headless run does not need."""
+"""Optional dependencies: the extras of the installation, and a check that one of them is installed."""
 
 from importlib.util import find_spec
 

@@ -31,7 +31,7 @@ _SMALLEST = 1e-8
 """Energy, relative to that at overturning, below which the block counts as at rest: the tilt is at most 1e-9 rad."""
 
 _MOST = 2000
-"""Greatest number of impacts computed."""
+"""Maximum number of impacts that are computed."""
 
 
 def critical_angle(block: Block) -> float:

@@ -98,7 +98,9 @@ def gain_spectrum(
     amplitude: float,
     bare_amplitude: float | None = None,
 ) -> list[GainPrediction]:
-    """Compute `predict_gain` at each of `omegas` [rad/s], but faster: orbits are extrapolated from their neighbours."""
+    """Results of `predict_gain` at each of `omegas` [rad/s], computed faster: each orbit is extrapolated from the
+    previous ones.
+    """
     places = [float(omega) for omega in omegas]
     try:
         branch = rocking_branch(specimen, places, amplitude)
@@ -116,10 +118,11 @@ def seismic_curve(
     betas: Sequence[float] | NDArray[np.float64],
     scheduler: str | None = None,
 ) -> list[SeismicGain]:
-    """Gain coefficients under `record`, from rest, at each stiffness ratio of `betas`, on all processors.
+    """Gain coefficients under `record`, from rest, for each spring label of `betas`, computed on all processors.
 
-    The peaks are those during the record, without the free motion after it. Raises InvalidInput for a negative
-    stiffness ratio, or a record under which the bare frame does not move. Source: Eq. (10).
+    The peaks are those during the record, without the free motion after it. Raises InvalidInput for a record under
+    which the bare frame does not move or does not remain finite, and pydantic's ValidationError for a negative label.
+    Source: Eq. (10).
     """
     bare = simulate(specimen.bare(), record)
     if bare.status is not Status.COMPLETED or not min(bare.peaks.u1, bare.peaks.drift) > 0.0:

@@ -129,7 +129,7 @@ class Identified(Parameters):
         names = self.names
         for index, name in enumerate(names):
             if name in names[:index]:
-                raise InvalidInput("findings", name, "each quantity may occur once")
+                raise InvalidInput("findings", name, "each quantity may occur only once")
         labels = sorted((label, name) for name in names if (label := spring_label(name)) is not None)
         for (label, _), (next_label, name) in pairwise(labels):
             if isclose(label, next_label):
@@ -144,7 +144,9 @@ class Identified(Parameters):
             if one.first == one.second or one.pair in pairs:
                 pair = f"{one.first}, {one.second}"
                 raise InvalidInput(
-                    "correlations", pair, "a correlation must name two different findings, and each pair may occur once"
+                    "correlations",
+                    pair,
+                    "a correlation must name two different findings, and each pair may occur only once",
                 )
             pairs.add(one.pair)
         if self.correlations and float(np.linalg.eigvalsh(self.correlation(names)).min()) < -_ROUNDING:

@@ -51,7 +51,9 @@ _WIDTH = {
 """Name of the half width of each quantity. Masses have none, because they are weighed or identified by a fit."""
 
 _OF_MASSES = "stiffness"
-"""Name of the half width with which lists of contributions group the masses: one fit identifies frame and masses."""
+"""Name of the half width with which the masses are grouped in lists of contributions: one fit identifies the frame's
+stiffnesses and masses.
+"""
 
 
 class SpecimenKnowledge(SpecimenUncertainty):
@@ -162,7 +164,7 @@ def root_of(matrix: Floats) -> Floats:
 
 
 def _governor(finding: str) -> str:
-    """Name of the half width that a finding replaces."""
+    """Name of the half width that a finding replaces, or with which it is grouped."""
     return _WIDTH.get(finding, _OF_MASSES if finding in FRAME else _WIDTH[SPRING])
 
 

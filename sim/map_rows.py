@@ -60,8 +60,8 @@ def rows_of_orbits(
 ) -> Generator[tuple[Rows, Continuation], None, None]:
     """Orbits of each of the `specimens`, in blocks of rows, with the state from which the next block continues.
 
-    The first block follows the state `after`, if there is one. `scheduler` and `done` are those of `sim.sweep.sweep`;
-    `done` counts the strips of each block.
+    The first block continues from the state `after`, if there is one. `scheduler` and `done` are those of
+    `sim.sweep.sweep`; `done` counts the strips of each block.
     """
     with connection(scheduler):
         parts = np.array_split(np.arange(omegas.size), min(omegas.size, STRIPS * processors(scheduler)))
@@ -96,8 +96,8 @@ def rows_of_orbits(
 @dataclass(frozen=True, eq=False)
 class _Strip:
     """Columns that are continued together, from known rows of the first specimens: `sections`, shape (k, m, 6), and
-    `jacobians`, shape (k, m, 6, 6). The last j rows belong to the block of rows that is computed; `peaks`, shape
-    (j, m, 3), are theirs.
+    `jacobians`, shape (k, m, 6, 6). The last j of these rows are part of the block of rows to be computed; `peaks`,
+    shape (j, m, 3), are the peaks of these j rows.
     """
 
     specimens: list[Specimen]
@@ -157,7 +157,7 @@ def _multipliers(row: Solutions) -> NDArray[np.complex128]:
 
 
 def _first_row(specimen: Specimen, omegas: Floats, amplitude: float) -> Solutions:
-    """First row, from which all columns start; where continuation along it fails, points are computed separately."""
+    """First row, from which all columns start; if continuation along it fails, its points are computed separately."""
     places = [float(omega) for omega in omegas]
     try:
         branch = branch_solutions(specimen, places, amplitude)

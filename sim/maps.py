@@ -92,7 +92,7 @@ def gain_map(
 
     The base acceleration is `amplitude` [m/s2] sin(omega t); in the test without block, its amplitude is
     `bare_amplitude`, if different. `scheduler` and `done` are those of `sim.sweep.sweep`. Raises InvalidInput for an
-    empty axis or values outside their ranges.
+    empty axis or a frequency or amplitude outside its range, and pydantic's ValidationError for a negative stiffness.
     """
     rows, row_of = np.unique(np.asarray(betas, dtype=np.float64), return_inverse=True)
     columns, column_of = np.unique(np.asarray(omegas, dtype=np.float64), return_inverse=True)
@@ -136,8 +136,8 @@ def gain_map_blocks(
 ) -> Generator[tuple[GainMap, Continuation], None, None]:
     """Same as `gain_map`, in blocks of `rows_at_once` stiffnesses; both axes must be ascending.
 
-    Each block is returned with the state from which the next one continues. As `after`, it lets a map continue in
-    another process, with identical digits. `done` counts the parts of each block.
+    Each block is returned with the state from which the next one continues. With this state as `after`, a map can be
+    continued in another process, with identical digits. `done` counts the parts of each block.
     """
     if not (betas.size and omegas.size):
         raise InvalidInput("grid", (betas.size, omegas.size), "the map needs at least one stiffness and one frequency")

@@ -56,9 +56,9 @@ class Outcome(StrEnum):
 class Reached:
     """Outcome of a start-up.
 
-    `time` [s], from the beginning, is when the block overturned or the outcome was decided. `side` is the
-    corner about which it overturned. `peaks` are those of the last 20 periods of the drive; None if the block toppled
-    or the run failed.
+    `time` [s], from the beginning of the start-up, is the time at which the block overturned or the outcome was
+    decided. `side` is the corner about which it overturned. `peaks` are those of the last 20 periods of the drive; None
+    if the block toppled or the run failed.
     """
 
     outcome: Outcome

@@ -1,7 +1,7 @@
 """Declarations of parameters and recorded values, with unit, limits and meaning in one place.
 
 Validation, configuration file, command-line flags, documentation table and the data file's metadata follow from the
-declaration of a parameter; the data file's column, and its handling by reader, export and replay, follow from the
+declaration of a parameter; a column of the data file, and its handling by reader, export and replay, follow from the
 declaration of a recorded value.
 """
 
@@ -118,5 +118,5 @@ def _extra(field: FieldInfo) -> dict[str, Any]:
 def each_once(values: tuple[float, ...]) -> tuple[float, ...]:
     """Validator that returns the `values` of a list, or raises ValueError if one occurs twice."""
     if len(set(values)) < len(values):
-        raise ValueError("each value may occur once")
+        raise ValueError("each value may occur only once")
     return values

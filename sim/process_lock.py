@@ -19,7 +19,7 @@ locked the file.
 
 
 class LockHeld(Exception):
-    """Another program holds the lock; its name is in the file `name`."""
+    """Another program holds the lock; the name of that program is in the file `name`."""
 
     def __init__(self, name: Path) -> None:
         super().__init__(name)
@@ -65,7 +65,8 @@ class ProcessLock:
         with suppress(OSError):
             self._name.unlink(missing_ok=True)
         if remove:
-            # while the lock is held, so that the file is not that of a later holder; Windows removes it at the release
+            # while the lock is held, so that the file is not that of a later holder; on Windows this fails, because the
+            # file is open, and filelock removes the file after the release
             with suppress(OSError):
                 self.path.unlink(missing_ok=True)
         self._lock.release()

@@ -19,7 +19,7 @@ class RecordRuns:
     peaks.
 
     The results are bit-identical to those of `sim.rocking.simulate` under a `SampledRecord`, but no new table of
-    segments is made for each record. An object may be used by one thread only.
+    segments is made for each record. One thread at a time may use an object.
     """
 
     def __init__(self, samples: int, dt: float) -> None:

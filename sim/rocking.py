@@ -1,6 +1,6 @@
 """Motion of the specimen under a base acceleration: rest, rocking, impacts, overturning.
 
-Front end to `sim.kernel.rocking` with named types, checks and threads.
+Front end to `sim.kernel.rocking` with named types and checks.
 """
 
 from dataclasses import dataclass
@@ -38,7 +38,7 @@ class Mode(IntEnum):
 
 
 class Status(StrEnum):
-    """Ending of a run."""
+    """Status at the end of a run."""
 
     COMPLETED = "completed"
     OVERTURNED_A = "overturned about A"
@@ -128,7 +128,7 @@ def simulate(
     result, not an error. Samples and peaks do not affect the motion, and take time only when requested.
 
     Raises InvalidInput, before anything is integrated, for values outside their ranges. Source: Eq. (8), (9), (A.1) and
-    (A.3) of the paper; `sim.kernel.rocking.run` states when the block comes to rest.
+    (A.3) of the paper; the condition in which the block comes to rest is given in `sim.kernel.rocking.run`.
     """
     check_options(tolerance, overturning_angle)
     run = RockingRun(
@@ -138,7 +138,7 @@ def simulate(
 
 
 def series_order(tolerance: float, segment: float) -> int:
-    """Order of the Taylor series that reaches `tolerance` at minimum cost, for segments of a typical length [s].
+    """Order of the Taylor series that reaches `tolerance` at minimum cost; `segment` is the typical segment length [s].
 
     Long segments need 1.6 orders per digit (measured). Under a record, most steps end at a sample, so that a lower
     order that just spans one interval is cheaper; the radius of convergence of the motion is about 0.27 s. The step
@@ -173,8 +173,8 @@ def check_state(specimen: Specimen, state: State, overturning_angle: float) -> N
 def motion_of(
     report: NDArray[np.float64], x: NDArray[np.float64], samples: NDArray[np.float64] | None, *, watched: bool
 ) -> Motion:
-    """Result of a run, from the kernel's `report`, shape (8,), and the end state `x`, shape (6,); `watched` states
-    whether peaks were requested.
+    """Result of a run, from the kernel's `report`, shape (8,), and the end state `x`, shape (6,); `watched` is True if
+    peaks were requested.
     """
     from sim.kernel import steps as kernel
 

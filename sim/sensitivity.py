@@ -198,7 +198,7 @@ def budget(
     names = list(standard_uncertainties)
     for name, size in standard_uncertainties.items():
         if name not in sensitivities:
-            raise InvalidInput("standard uncertainty of", name, f"known parameters: {', '.join(sensitivities)}")
+            raise InvalidInput("parameter", name, f"it must be one of {', '.join(sensitivities)}")
         if not 0.0 <= size < np.inf:
             raise InvalidInput(f"standard uncertainty of {name}", size, "it must be finite and 0 or more")
     matrix = np.eye(len(names))

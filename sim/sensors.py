@@ -158,7 +158,7 @@ SIMULATED = ("acceleration", "velocity", "displacement")
 
 
 class PlacedSensor(LinearSensor):
-    """Further sensor with a proportional voltage output, for the motion of `place` relative to the ground."""
+    """Additional sensor with a proportional voltage output, for the motion of `place` relative to the ground."""
 
     name: str = quantity(..., "", "name of the sensor's channel")
     measures: str = quantity(..., "", "measured quantity, one of SIMULATED")

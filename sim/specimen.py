@@ -168,7 +168,7 @@ class Specimen(Parameters):
     def _check_labels(self) -> "Specimen":
         labels = [spring.label for spring in self.springs]
         if len(set(labels)) < len(labels):
-            raise InvalidInput("springs", labels, "each label may occur once")
+            raise InvalidInput("springs", labels, "each label may occur only once")
         if self.spring_label is not None and self.beta is None:
             raise InvalidInput("spring_label", self.spring_label, "the bare frame has no spring: omit it")
         return self

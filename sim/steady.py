@@ -122,7 +122,7 @@ def rocking_orbit(specimen: Specimen, omega: float, amplitude: float, guess: Orb
 def rocking_branch(specimen: Specimen, omegas: Sequence[float] | NDArray[np.float64], amplitude: float) -> list[Orbit]:
     """Rocking orbits at `omegas` [rad/s], in the given order, each extrapolated from the previous ones.
 
-    Raises as `rocking_orbit` does.
+    Raises the errors of `rocking_orbit`.
     """
     places = [float(omega) for omega in omegas]
     branch = branch_solutions(specimen, places, amplitude)

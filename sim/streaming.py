@@ -28,13 +28,12 @@ from sim.specimen import Specimen
 class Stream:
     """Specimen whose motion advances as the base acceleration arrives.
 
-    The acceleration consists of values at intervals of `dt` [s], interpolated linearly, where the very first value is
-    only the start of the first interval. With `held`, each value is instead held for the following `dt`, as at the
-    output of a converter. In each interval, `divisions` states are evaluated, at the ends of equal parts; with
-    `divisions` = 0, none. `dt` may be far longer than the spacing of the states, because the motion within an interval
-    is a polynomial. `peaks_from` [s] is the start of the window of the running peaks, or None for no peaks. The
-    other arguments are those of `sim.rocking.simulate`, and the motion is bit-identical to its motion under a
-    `SampledRecord`.
+    The acceleration consists of values at intervals of `dt` [s], interpolated linearly; the very first value is only
+    the start of the first interval. With `held`, each value is instead held for the following `dt`, as at the output of
+    a converter. In each interval, `divisions` states are evaluated, at the ends of equal parts; with `divisions` = 0,
+    none. `dt` may be far longer than the spacing of the states, because the motion within an interval is a polynomial.
+    `peaks_from` [s] is the start of the window of the running peaks, or None for no peaks. The other arguments are
+    those of `sim.rocking.simulate`, and the motion is bit-identical to its motion under a `SampledRecord`.
 
     Raises InvalidInput for values outside their ranges.
     """
@@ -99,7 +98,7 @@ class Stream:
         """Advance through the next values [m/s2], shape (n,), any n. Returns the states evaluated, shape (m, 6).
 
         m is `divisions` times the number of completed intervals; the columns are those of `State.as_array`. There are
-        no rows after an overturning or a failure, and later input is ignored, see `status`.
+        no rows after an overturning or a failure, which `status` reports; later input is ignored.
 
         Raises InvalidInput, without advancing, for values that are not finite or not one-dimensional.
         """

@@ -50,12 +50,12 @@ def sweep(
     batch: int = 1,
     done: Done | None = None,
 ) -> list[Result]:
-    """Apply `function` to each item and return the results in order. The first exception in `function` is raised here.
+    """Apply `function` to each item and return the results in order. Raises the first exception in `function`.
 
     By default, the function runs in as many threads as there are processors, see `in_threads`. With the address of a
     dask `scheduler`, such as "tcp://10.0.0.5:8786", it runs in the workers of the scheduler, which need this package;
-    function and items must be picklable. A task has `batch` items: choose a value with which a task takes much longer
-    than the few milliseconds of its transfer. `done` then counts tasks.
+    function and items must be picklable. There, a task has `batch` items, and `done` counts tasks: choose a value with
+    which a task takes much longer than the few milliseconds of its transfer.
 
     Raises InvalidInput for batch < 1, MissingExtra without the extra "distributed", and SchedulerUnavailable if the
     scheduler does not respond.
@@ -72,11 +72,11 @@ def in_threads(
     function: Callable[[Item], Result], items: Iterable[Item], done: Done | None = None, *, threads: int | None = None
 ) -> list[Result]:
     """Apply `function` to each item in `threads`, by default as many as there are processors, and return the results in
-    order. `done` is called in this thread.
+    order. `done` is called in the calling thread.
 
     Threads are suitable for work in `sim.kernel`, which releases the interpreter lock. The first exception in
-    `function` is raised here, as is KeyboardInterrupt; then no further item is started, and items in progress are not
-    awaited.
+    `function` is raised in the calling thread, as is KeyboardInterrupt; then no further item is started, and there is
+    no wait for items in progress.
     """
     pool = ThreadPoolExecutor(threads or processors())
     try:

@@ -29,8 +29,8 @@ STEP = 1e-5
 """Step of the finite differences, relative to the scale of each state."""
 
 CLOSED, QUICK = 1e-9, 0.2
-"""Relative mismatch over a period below which an orbit counts as closed, and ratio of successive mismatches up to which
-the derivatives are kept.
+"""Relative mismatch over a period up to which an orbit counts as closed, and ratio of successive mismatches up to which
+the derivatives are reused.
 """
 
 PURE = 1e-4
@@ -72,9 +72,9 @@ class TableOrbit:
 def table_orbit(fixed: Orbit, shaker: Shaker, harmonics: int = 5) -> TableOrbit:
     """Orbit on the table of `shaker` that corresponds to the rocking orbit `fixed` on fixed ground.
 
-    The harmonics 1 to `harmonics` of the drive are such that, of these harmonics, the table's acceleration has only the
-    fundamental, with the amplitude of `fixed`. Raises NoOrbit if Newton's method does not find the orbit, or the block
-    comes to rest or falls.
+    The drive contains the harmonics 1 to `harmonics`, of which the table's acceleration has only the fundamental, with
+    the amplitude of `fixed`. Raises NoOrbit if Newton's method does not find the orbit, or the block comes to rest or
+    falls.
     """
     period = TablePeriod(fixed.specimen, shaker, fixed.omega)
     phase, start = _widest(fixed)
@@ -180,7 +180,7 @@ class TablePeriod:
         return y, samples
 
     def closed(self, start: Array, drive: NDArray[np.complex128]) -> Array:
-        """Start of the closed orbit under this drive, by Newton's method. The derivatives are kept while each step
+        """Start of the closed orbit under this drive, by Newton's method. The derivatives are reused while each step
         reduces the mismatch to at most the fraction `QUICK`.
         """
         y, before = start, np.inf

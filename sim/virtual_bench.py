@@ -67,7 +67,9 @@ class VirtualBenchParameters(Parameters):
 
 @dataclass(frozen=True)
 class Truth:
-    """True motion at the ticks of the last block, which no instrument measures exactly, as arrays of shape (n,)."""
+    """True motion at the ticks of the last block, which no instrument measures exactly: arrays of shape (n,), in SI
+    units.
+    """
 
     x: Array
     v: Array
@@ -81,7 +83,7 @@ class Truth:
 
 
 class VirtualBench:
-    """Bench that converts drive voltage to counts, tick by tick, without limit of time.
+    """Bench that converts drive voltage to counts, tick by tick, for any duration.
 
     The channels of the `further` sensors follow those of table and lasers. All random numbers depend on `seed`: the
     same seed and drive give the same counts, however the drive is divided into blocks. Tick i of a block is sampled

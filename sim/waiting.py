@@ -1,5 +1,5 @@
-"""Waits of the main thread, in short steps, because on Windows before Python 3.14 Ctrl-C does not end the wait for a
-lock.
+"""Waits of the main thread, in short steps, because on Windows before Python 3.14 Ctrl-C does not interrupt the wait
+for a lock.
 """
 
 import time
@@ -63,7 +63,7 @@ def put(queue: Queue[Item], item: Item, timeout: float) -> bool:
 
 
 def end(process: "Popen[bytes]", timeout: float) -> None:
-    """Wait until a process has ended. Kills it after `timeout` [s]."""
+    """Wait until a process has ended. After `timeout` [s] the process is killed."""
 
     def ended(step: float) -> bool:
         try:

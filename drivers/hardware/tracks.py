@@ -140,9 +140,9 @@ class Tracks:
     def counts(self, first: int, n: int, lead: int) -> NDArray[np.int16]:
         """Counts at `n` samples from `first` on, shape (n, n_tracks); waits for late values.
 
-        `lead` is the number of drive samples queued beyond the block. The wait ends in time for the next write,
-        however late the block already is. Values that have not arrived by then are marked as late; there is no wait for
-        a silent sensor. Raises ConnectionLost, and RigError before a run.
+        `lead` is the number of drive samples queued beyond the block. The wait ends in time for the next write, however
+        late the block already is. Values that have not arrived by then are marked as late; there is no wait for a
+        silent sensor. Raises ConnectionLost, and RigError before a run.
         """
         last = (first + n - 1) / self._sample_rate
         self._await(last, now() + longest_wait(lead / self._sample_rate, self._since(last)))

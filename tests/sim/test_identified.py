@@ -68,7 +68,7 @@ def test_what_cannot_be_found_is_refused(name: str, value: float, said: str) -> 
     [
         ((related("k1", "m1", 0.1),), "no such finding"),
         ((related("k1", "k1", 0.1),), "two different findings"),
-        ((related("k1", "k2", 0.1), related("k2", "k1", 0.1)), "each pair may occur once"),
+        ((related("k1", "k2", 0.1), related("k2", "k1", 0.1)), "each pair may occur only once"),
         ((related("k1", "k2", -0.9), related("k2", "xi1", -0.9), related("k1", "xi1", -0.9)), "negative eigenvalue"),
     ],
 )

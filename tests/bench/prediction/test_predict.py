@@ -298,7 +298,7 @@ def test_significant_digits() -> None:
         ("steady --omega 0", "--omega = 0.0 is refused: it must be a number above 0"),
         ("steady --omega", "--omega = [] is refused"),
         ("steady --omega 16 x", "--omega = 'x' is refused"),
-        ("steady --omega 16 16", "each value may occur once"),
+        ("steady --omega 16 16", "each value may occur only once"),
         ("steady --beta 0,25", "--beta = '0,25' is refused: write 0.25; separate values by spaces"),
         ("steady --beta 0.25,0.64", "--beta = '0.25,0.64' is refused: a comma is not a separator"),
         ("map --omega 21:12:10", "--omega = '21:12:10' is refused: the range descends: write 12:21:10"),

@@ -215,7 +215,7 @@ def test_the_figure_breaks_the_curve_where_the_block_topples() -> None:
         ("seismic --peak-factor 0", "--peak-factor = 0.0 is refused"),
         ("seismic --trim 0.5", "--trim = 0.5 is refused"),
         ("seismic --length-ratio 2", "--length-ratio = 2.0 is refused"),
-        ("seismic --beta 0.2 0.2", "each value may occur once"),
+        ("seismic --beta 0.2 0.2", "each value may occur only once"),
         ("seismic --stroke-fit tight", "--stroke-fit = 'tight' is refused"),
         ("seismic --config absent.toml", "there is no such file"),
         ("seismic --plot figure.jpg", "its name must end with .png"),

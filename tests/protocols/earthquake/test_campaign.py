@@ -147,7 +147,7 @@ def test_the_data_file_replays_without_the_files_that_the_run_read(
         (["synthetic:kobe", "--table-band", "0.5:25"], "within the table's band, 1 to 100 Hz"),
         (["synthetic:kobe", "--table-band", "20:10"], "two ascending frequencies above 0 Hz"),
         (["synthetic:kobe", "--table-band", "none"], "must be filtered to a band"),
-        (["synthetic:kobe", "--beta", "0.5", "0.5"], "each value may occur once"),
+        (["synthetic:kobe", "--beta", "0.5", "0.5"], "each value may occur only once"),
         (["synthetic:kobe", "--peak-factor", "5"], "limits."),
     ],
 )
