@@ -28,7 +28,7 @@ from sim.specimen import Block
 Array = NDArray[np.float64]
 
 _SMALLEST = 1e-8
-"""Energy, relative to that at overturning, below which the block counts as at rest: the tilt is at most 1e-9 rad."""
+"""Energy, relative to that at overturning, below which the block counts as at rest: a tilt of about 1e-9 rad."""
 
 _MOST = 2000
 """Maximum number of impacts that are computed."""
