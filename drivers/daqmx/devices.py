@@ -227,5 +227,6 @@ def _require_rate(
             raise InvalidInput(
                 "sample_rate",
                 rate,
-                f"{channels} inputs of {device.name} ({device.product}) can be read at up to {highest:g}/s each",
+                f"with {channels} in use, the inputs of {device.name} ({device.product}) can be read at"
+                f" {highest:g}/s at most",
             )

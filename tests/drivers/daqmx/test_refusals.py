@@ -34,7 +34,11 @@ from tests.drivers.daqmx.others import Another
         ),
         ({"inputs": ()}, "inputs", "at least one"),
         # the data sheet: 2 MS/s for one channel, 1 MS/s for all together
-        ({"rate": 251e3}, "sample_rate", "4 inputs of Dev1 (USB-6363) can be read at up to 250000/s each"),
+        (
+            {"rate": 251e3},
+            "sample_rate",
+            "with 4 in use, the inputs of Dev1 (USB-6363) can be read at 250000/s at most",
+        ),
         ({"rate": 2.9e6}, "sample_rate", "has a maximum rate of 2.86e+06/s"),
         ({"rate": 0.0}, "sample_rate", "greater than 0"),
         ({"lead": -1}, "lead", "0 or more"),
