@@ -60,9 +60,9 @@ from bench.app.gui.controller import Controller
 from bench.app.display.theme import LIGHT
 from bench.app.gui.window import Window
 application = QApplication([])
-dress(application, LIGHT)
 controller = Controller()
 window = Window(controller, configuration, all_protocols()[0], LIGHT, tour=True)
+dress(application, LIGHT)
 """
 PEER = """
 import pyqtgraph

@@ -37,7 +37,7 @@ class GainPlot(pg.PlotWidget):
     """
 
     def __init__(self, theme: Theme) -> None:
-        super().__init__()
+        super().__init__(enableMenu=False)
         self._prediction: Table = {}
         self._added: list[tuple[Mapping[str, Any], int]] = []
         self._kind: Kind = "spectrum"
@@ -51,7 +51,6 @@ class GainPlot(pg.PlotWidget):
         self.setAccessibleName("gain plot")
         self._item: Any = self.getPlotItem()
         self._item.showGrid(x=True, y=True, alpha=0.25)
-        self._item.setMenuEnabled(False)
         self._item.sigYRangeChanged.connect(self._tick)
         self._legend = self._item.addLegend(offset=(-8, 8), labelTextSize="9pt")
         # one item for all points and one for all uncertainties, because separate items take half a millisecond each per

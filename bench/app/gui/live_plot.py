@@ -21,13 +21,12 @@ class LivePlot(pg.PlotWidget):
     """Plot of the series of a fit along its axis; draws those with the unit of the first series."""
 
     def __init__(self, theme: Theme) -> None:
-        super().__init__()
+        super().__init__(enableMenu=False)
         self._theme = theme
         self._shown: FitFinished | TableIdentified | None = None
         self.setAccessibleName(texts.NAMES["live"])
         self._item: Any = self.getPlotItem()
         self._item.showGrid(x=True, y=True, alpha=0.25)
-        self._item.setMenuEnabled(False)
         self._legend = self._item.addLegend(offset=(-8, 8), labelTextSize="9pt")
         self.drawn: list[str] = []
         """Names of the drawn curves."""

@@ -52,13 +52,12 @@ class MotionPlot(pg.PlotWidget):
     """Plot of one kind; the live model's motion is drawn behind that of the specimen in the phase plane."""
 
     def __init__(self, theme: Theme, kind: Kind) -> None:
-        super().__init__()
+        super().__init__(enableMenu=False)
         self.kind: Kind = kind
         self.omega: float | None = None
         """Circular frequency of the base motion [rad/s]; None outside a steady sine."""
         self._model = np.zeros((0, 3))
         self._item: Any = self.getPlotItem()
-        self._item.setMenuEnabled(False)
         self._item.hideButtons()
         self._item.showGrid(x=True, y=True, alpha=0.25)
         self.setAccessibleName(texts.MOTION_NAMES[kind])

@@ -67,7 +67,7 @@ class TracePlot(QWidget):
         self.ring = Ring(len(NAMES) + len(further))
         self._columns = columns_of(further)
         self._reach = np.full(len(self._columns), LEAST)
-        self.plots = [self.view.addPlot(row=row, col=0) for row in range(len(self._columns))]
+        self.plots = [self.view.addPlot(enableMenu=False, row=row, col=0) for row in range(len(self._columns))]
         self.curves = [plot.plot(antialias=False) for plot in self.plots]
         for plot in self.plots:
             _arrange(plot, last=plot is self.plots[-1])
@@ -164,7 +164,6 @@ def _arrange(plot: Any, *, last: bool) -> None:
     plot.setXRange(-WINDOW, 0.0, padding=0.0)
     plot.setYRange(-1.0, 1.0, padding=0.0)
     plot.setMouseEnabled(x=False, y=False)
-    plot.setMenuEnabled(False)
     plot.hideButtons()
     plot.showGrid(y=True, alpha=0.25)
     plot.getAxis("left").setWidth(58)

@@ -247,11 +247,12 @@ def open_window(
     application.setApplicationName("rocking-bench")
     settings = QSettings()
     theme = chosen_theme(str(settings.value("theme", "")))
-    dress(application, theme)
     controller = Controller()
     window = Window(
         controller, configuration, entries, theme, path=path, settings=settings, queue=queue, tour=path is None
     )
+    # after the window is built, because in a styled application every insertion of a widget styles its children again
+    dress(application, theme)
     undo = attend(window, controller, application)
     follow_choice(window, application, settings)
     window.show()

@@ -100,9 +100,11 @@ def without_live_plots(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def window(qtbot: QtBot, qapp: QApplication, tmp_path: Path) -> Generator[Window, None, None]:
     """The window, in front, with the filter of STOP that the application has."""
-    dress(qapp, LIGHT)
+    # built without a theme, as by the program: with one, every insertion of a widget would style its children again
+    qapp.setStyleSheet("")
     controller = Controller()
     shown = Window(controller, bench(), (SHAKING, *PROTOCOLS), LIGHT)
+    dress(qapp, LIGHT)
     key = StopFilter(controller, shown.header.stop)
     qapp.installEventFilter(key)
     shown.protocol.folder.setText(str(tmp_path / "run"))
