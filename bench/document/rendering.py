@@ -27,8 +27,9 @@ _DIGITS = re.compile(r"(\.\d\d)\d+")
 _RULE = re.compile(r"<defs>\s*<style.*?</style>\s*</defs>\s*", re.DOTALL)
 _OPENING = re.compile(r"<svg\b([^>]*)>")
 
-WIDTH, HEIGHT = 6.77, 9.4
-"""Largest figure [in]: the text area of an A4 page minus a caption of a few lines."""
+WIDTH, HEIGHT = 6.77, 8.0
+"""Largest figure [in]: the text area of an A4 page minus a heading, a paragraph and a caption of a few lines each, so
+that a section with one large figure fits on a page."""
 
 
 def html_page(document: Document) -> str:

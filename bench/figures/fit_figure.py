@@ -12,7 +12,7 @@ from bench.findings import FitFinished
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-WIDTH, ROW, LEGEND = 6.8, 1.7, 0.8
+WIDTH, ROW, LEGEND = 6.8, 1.3, 0.5
 """Width of the figure, height of a panel, height of legend and axis [inch]."""
 
 LINES = ((BLUE, "-", 1.4), (VERMILLION, "--", 1.0), (BLACK, ":", 1.0), (GREEN, "-.", 1.0), (PURPLE, "-", 0.8))
