@@ -178,10 +178,11 @@ def newton(q: Floats, x: Floats, known: Floats | None = None, accuracy: Accuracy
         place[active] -= _solved(jacobian[active] - np.eye(6), mismatch)
         if not active.size:
             break
-    place[~found], jacobian[~found] = np.nan, np.nan
     if found.any() and accuracy is not None:
         jacobian[found] = jacobians(q[found], place[found], accuracy)
         found &= np.isfinite(jacobian).all(axis=(1, 2))
+    for each in (place, jacobian, peaks):
+        each[~found] = np.nan
     return Solutions(place, jacobian, peaks, found)
 
 

@@ -2,7 +2,7 @@
 
 from typing import Literal
 
-from pydantic import model_validator
+from pydantic import field_validator, model_validator
 
 from sim.errors import InvalidInput
 from sim.parameters import Parameters, quantity
@@ -18,6 +18,12 @@ class AnalogInput(Parameters):
     terminal: str = quantity("Dev1/ai0", "", "physical channel of the input")
     wiring: Wiring = quantity("default", "", "terminal configuration of the input")
     range: float = quantity(10.0, "V", "largest magnitude of the voltage at the input", gt=0, le=60, usual=(1.0, 60.0))
+
+    @field_validator("terminal")
+    @classmethod
+    def _without_slash(cls, terminal: str) -> str:
+        # NI MAX shows terminals with a leading slash, the names of a device's channels have none
+        return terminal.strip("/")
 
 
 class SafetyInput(Parameters):

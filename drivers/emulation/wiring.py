@@ -29,8 +29,8 @@ HEARTBEAT = 1.5
 """Time-out of the heartbeat relay [s]; longer than the watchdog's, so that both can be observed."""
 _READY = 1.0
 """Declared delay of the amplifier: longest time from enable to ready [s]."""
-_RELAYS, _CONTACTS = 2, 4
-"""Number of lines for the enable and heartbeat relays, and for the contacts of the safety chain."""
+_CONTACTS = 4
+"""Number of lines for the contacts of the safety chain."""
 
 
 @dataclass(frozen=True)

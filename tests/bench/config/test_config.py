@@ -243,6 +243,7 @@ def test_a_simulated_bench_keeps_its_own_rate_and_seed_beside_the_hardware(file:
         ("[hardware]\nsample_rate = 30000", "hardware.sample_rate = 30000 .* at most 20000"),
         ("[hardware.laser_1]\nport = 'COM5'\n[hardware.laser_2]\nport = 'COM5'", "laser_1 already uses this port"),
         ("[hardware.table_acceleration]\nterminal = 'dev1/AI0'", "table_displacement already uses this terminal"),
+        ("[hardware.table_acceleration]\nterminal = '/Dev1/ai0'", "table_displacement already uses this terminal"),
         ("[hardware.lasers]\nconnection = 'usb'", 'hardware.lasers.connection = \'usb\' .* "serial" or "analogue"'),
         ("[hardware.lasers]\ndelay = 0.2", "hardware.lasers.delay = 0.2 .* at most 0.1 s"),
         ("[hardware.laser_1]\npolarity = 2", "hardware.laser_1.polarity = 2"),
