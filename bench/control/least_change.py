@@ -160,7 +160,9 @@ peak.
 """
 
 PASSES = 2
-"""Number of iterations: each constrains the oscillators' peaks at their previous and new instants."""
+"""Number of solutions; from the second on, the cost includes the oscillators' responses at the instants of the original
+peaks and of the previous solution's peaks.
+"""
 
 CLOSER = 1e-4
 """Fraction of a limit that the solution reserves for rounding and for the samples between peaks."""
@@ -183,9 +185,9 @@ def fit_by_least_change(
     """`acceleration` [m/s2], shape (n,), with the smallest change that keeps the table within `reach` and leaves it at
     rest.
 
-    `periods` [s] and `damping` are those of the oscillators whose peaks are preserved; the change has no content below
-    `lowest` [Hz]. Raises InvalidInput if no change with frequencies between `lowest` and 2 Hz (or four times `lowest`,
-    if higher) is sufficient.
+    `periods` [s] and `damping` are those of the oscillators whose peaks are preserved; the change consists of half
+    sines with frequencies of at least `lowest` [Hz]. Raises InvalidInput if no change with frequencies between `lowest`
+    and 2 Hz (or four times `lowest`, if higher) is sufficient.
     """
 
     def peaks_of(record: Array) -> list[Peak]:

@@ -32,7 +32,7 @@ class DriveCalibration:
 
     @staticmethod
     def flat(response: complex) -> "DriveCalibration":
-        """A calibration with the same response at every frequency, as a start for a measurement of the response."""
+        """A calibration with the same response at every frequency, as a starting point for measuring the response."""
         return DriveCalibration((1.0,), (response,))
 
     def at(self, omega: NDArray[np.float64]) -> NDArray[np.complex128]:
@@ -130,7 +130,7 @@ class Oscillator:
 
     @property
     def phase(self) -> float:
-        """Phase [rad] of the present sine at the last sample."""
+        """Phase [rad], 0 to 2 pi, at the last sample of a held sine; during a sweep, the phase at its beginning."""
         return self._phase
 
     @property

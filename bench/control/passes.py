@@ -41,7 +41,7 @@ class Envelope:
 @dataclass(frozen=True)
 class Verdict:
     """Fraction of a change that the limits allow, 0 to 1; if it is less than 1, `binds` names the limit that determines
-    it.
+    it, `demand` is the peak of this quantity with the whole change, and `allowed` the limit divided by the margin.
     """
 
     share: float
@@ -54,13 +54,13 @@ class Verdict:
             return "within every limit"
         unit = UNITS[self.binds]
         return (
-            f"{self.binds} of {self.demand:.4g} {unit} exceeds its limit of {self.allowed:.4g} {unit}; "
-            f"{self.share:.1%} of the change is possible"
+            f"{self.binds} of {self.demand:.4g} {unit} exceeds the allowed {self.allowed:.4g} {unit}, which is the "
+            f"limit divided by the margin; {self.share:.1%} of the change is possible"
         )
 
 
 def fitting(present: Envelope, change: Envelope, limits: Limits, margin: float) -> Verdict:
-    """Largest fraction of `change` that, added to `present`, keeps all quantities below their limits divided by
+    """Largest fraction of `change` that, added to `present`, keeps all quantities within their limits divided by
     `margin`.
     """
     share, binds, wanted, allowed = 1.0, None, 0.0, 0.0

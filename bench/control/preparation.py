@@ -190,8 +190,8 @@ def _trimmed(record: SampledRecord, share: float) -> _Trimmed:
 
 
 def _filtered(record: SampledRecord, band: tuple[float, float]) -> tuple[SampledRecord, float]:
-    """The band-limited record, and the rest added before it [s]; a corner above the record's Nyquist frequency has no
-    effect.
+    """The band-limited record, and the rest added before it [s]. The upper end of the band may exceed the record's
+    Nyquist frequency.
     """
     from scipy.fft import next_fast_len
 

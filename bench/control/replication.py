@@ -2,10 +2,10 @@
 
 A pass plays the drive u and measures the table. The error E is corrected through the inverse of the table: u <- u + Q
 IFFT{ W K conj(H) / (|H|^2 + eps^2 max|H|^2) E }, where K contains the coherence and the fraction of E that is not
-noise. It converges where |1 - Q H_true / H| < 1. After a pass with a large error, H is corrected by the response
-measured in that pass. A pass worse than the best one is rolled back; the best drive is played once more to measure the
-non-repeatable part, and the correction is halved. Thus the accepted error never grows, and neither noise nor
-non-repeatable motion is learned (De Cuyper, Linear feedback control for durability test rigs in the automotive
+noise. The iteration converges where |1 - Q H_true / H| < 1. After a pass with a large error, H is corrected by the
+response measured in that pass. A pass worse than the best one is rolled back; the best drive is played once more to
+measure the non-repeatable part, and the correction is halved. Thus the accepted error never grows, and neither noise
+nor non-repeatable motion is learned (De Cuyper, Linear feedback control for durability test rigs in the automotive
 industry, thesis, KU Leuven 2006).
 
 The passes end when the repeatable error is small enough both as root mean square, over the whole record, and in the
@@ -136,7 +136,7 @@ class Replication:
 
     @property
     def repeatable(self) -> float:
-        """Relative root mean square error of the best drive, excluding noise; 1 before the first pass."""
+        """Relative root mean square error of the best drive, excluding noise; about 1 before the first pass."""
         power = self._size(np.abs(self._missing) ** 2) ** 2 - self._size(self._noise) ** 2 / self._plays
         return max(power, 0.0) ** 0.5 / self._norm
 

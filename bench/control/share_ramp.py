@@ -23,7 +23,7 @@ class ShareRamp:
         """Change to `shares` within `samples` samples, beginning after `wait` samples; all other harmonics change to
         zero.
 
-        A change that is due later than this one is cancelled.
+        Pending changes that are due at the same sample as this one or later are cancelled.
         """
         due = self._played + wait
         while self._waiting and self._waiting[-1][0] >= due:

@@ -145,10 +145,11 @@ def _filter(found: CycleMap) -> Array:
 
 
 QUIET, CAPTURED = 0.01, 24
-"""Largest control of a captured motion, as a share, and number of successive cycles that must not exceed it."""
+"""Largest control of a captured motion, as a share, and number of successive cycles in which it must not be exceeded.
+"""
 
 LOST, ROUGH = 6, 0.5
-"""A captured motion counts as lost after this number of successive cycles whose control is at least this fraction of
+"""A captured motion counts as lost after this number of successive cycles in which the control exceeds this fraction of
 the authority.
 """
 
@@ -197,7 +198,7 @@ class HoldMonitor:
         self._missing = 0
         self._controls.append(abs(control))
         if drift > self.largest:
-            return f"the drift reached {1e3 * drift:.3g} mm, but {1e3 * self.largest:.3g} mm are allowed"
+            return f"the drift reached {1e3 * drift:.3g} mm, but only {1e3 * self.largest:.3g} mm is allowed"
         expected = self.answer * played
         if abs(achieved - expected) > ANSWER:
             ratio = achieved / expected

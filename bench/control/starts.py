@@ -4,7 +4,7 @@ At many points, switching the sine on overturns the block; at high frequencies i
 transient is chaotic and the specimen is uncertain, so each candidate is simulated with specimens drawn from the
 identification's uncertainty and with slightly different drives. A few draws select candidates and new draws rate those
 that remain, so the stated probability is not biased by the selection. Each selection round tries short candidates first
-and ends once enough of them have succeeded with every draw, since no longer candidate could displace them.
+and ends once enough of them have succeeded with every draw, since a longer candidate could not displace them.
 """
 
 from collections.abc import Sequence

@@ -98,7 +98,7 @@ NOT_BOTH = "band and stroke are incompatible: lower the band's lower end, or sca
 
 
 class Method(StrEnum):
-    """Method of the fit."""
+    """Fit by the smallest change that suffices, or by the high-pass filter with the lowest corner that suffices."""
 
     LEAST_CHANGE = "least-change"
     HIGH_PASS = "high-pass"

@@ -103,7 +103,7 @@ def test_a_table_that_no_longer_follows_ends_the_hold(turn: complex) -> None:
 
 
 def test_other_reasons_to_release() -> None:
-    assert "21 mm, but 20 mm are allowed" in (_monitor().push(0.0, 0.021, 1.0, 0.9 + 0.1j) or "")
+    assert "21 mm, but only 20 mm is allowed" in (_monitor().push(0.0, 0.021, 1.0, 0.9 + 0.1j) or "")
     assert "not captured within 200 cycles" in (_quiet(_monitor(), 200, control=0.08) or "")
     captured = _monitor()
     assert _quiet(captured, 30) is None
