@@ -67,8 +67,8 @@ def long_term(
     cycles: int = CYCLES,
     members: int = MEMBERS,
 ) -> LongTerm:
-    """Long-term motion after `cycles` cycles near the rocking orbit of `branch`, for its specimen and for `members`
-    specimens drawn from `known`.
+    """Long-term motion, `cycles` cycles after a start near the rocking orbit of `branch`, for its specimen and for
+    `members` specimens drawn from `known`; the orbit itself if it is stable on the table.
 
     The amplitude of the table's acceleration and its harmonics up to number `harmonics` are held at those of the orbit.
     Raises NoOrbit if there is no such orbit on the table.
@@ -117,7 +117,7 @@ def attractors_table(found: Sequence[LongTerm]) -> Table:
     def numbers(values: Sequence[float], unit: str, description: str) -> Column:
         return Column(np.array(values, dtype=np.float64), unit, description)
 
-    repeats = "number of cycles after which the motion repeats; 0 if it does not repeat, or the block falls"
+    repeats = "number of cycles after which the motion repeats; 0 if it does not repeat, or if the block falls"
     return {
         "beta": numbers([each.beta for each in found], "1", "stiffness ratio k_C/k1 of the coupling spring"),
         "omega_rad_s": numbers([each.omega for each in found], "rad/s", "circular frequency of the base motion"),

@@ -1,8 +1,8 @@
-"""Condition of a motion from rest: how strongly it depends on its inputs, and how accurately it is computed.
+"""Condition of a motion from rest: its sensitivity to its inputs, and the error of its computation.
 
-A sine barely above the uplift acceleration starts a motion that depends on the inputs millions of times more strongly
-than its relative changes suggest. The digits of such a motion are limited by the inputs long before they are limited by
-the integration, so that both are stated: the condition number, and the error of the computation.
+A sine barely above the uplift acceleration starts a motion whose relative changes are millions of times those of the
+inputs. The uncertainty of the inputs then limits the valid digits of the motion long before the integration does.
+Therefore both are stated: the condition number, and the error of the computation.
 """
 
 from collections.abc import Iterator
@@ -78,7 +78,9 @@ def _changed(coupled: Specimen) -> Iterator[Specimen]:
 
 
 def _distance(one: Motion, other: Motion) -> float:
-    """Greatest difference of the samples that both have, relative to each state's greatest magnitude."""
+    """Greatest difference between the samples of two motions, up to the end of the shorter one, relative to each state's
+    greatest magnitude.
+    """
     n = min(len(_samples(one)), len(_samples(other)))
     first, second = _samples(one)[:n], _samples(other)[:n]
     magnitude = np.abs(first).max(axis=0, initial=0.0)

@@ -141,7 +141,9 @@ def _locked(folder: Path) -> ProcessLock:
     try:
         return ProcessLock(folder / OWN, f"process {os.getpid()}")
     except LockHeld as error:
-        remedy = f"{error.holder} writes its map there; wait for its end, or choose another name for the results"
+        remedy = (
+            f"{error.holder} is writing its map there; wait for it to finish, or choose another name for the results"
+        )
         raise InvalidInput("folder", str(folder), remedy) from None
 
 

@@ -28,7 +28,10 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True)
 class Check:
-    """Check of one claim: the claim, the finding, and the numbers that underlie it, `values` (SI units, by name)."""
+    """Check of one claim: the claim, the finding, and the numbers that underlie it, `values` (SI units, by name).
+
+    `expected` is False for a claim that the model is known not to satisfy.
+    """
 
     claim: str
     found: str
@@ -62,7 +65,7 @@ class Statement:
 Floats = NDArray[np.float64]
 
 LOW, HIGH, STEP = 12.5, 22.5, 0.05
-"""Frequency range of a section [rad/s]."""
+"""Frequency range of a section, and its step [rad/s]."""
 
 PAPER_HIGH = 20.0
 """Highest frequency of the paper's spectra [rad/s]."""

@@ -211,7 +211,7 @@ def drive_table(stages: Sequence[Stage]) -> Table:
     return {
         "stage": Column(np.array([stage.name for stage, _ in rows], dtype=np.str_), "", "part of the run"),
         "chance": Column(
-            np.array(chances), "1", "estimated probability that the start succeeds; NaN if it is no start"
+            np.array(chances), "1", "estimated probability that the start succeeds; NaN for a stage that is not a start"
         ),
         "duration": Column(np.array([segment.duration for _, segment in rows]), "s", "duration of the segment"),
         "amplitude": Column(

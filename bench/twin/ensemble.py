@@ -81,7 +81,7 @@ _CYCLES = 5.0
 
 @dataclass(frozen=True)
 class Measured:
-    """Gain published by the protocol under a sine of `omega` [rad/s], or under an earthquake record (None)."""
+    """Gain published by the protocol, under a sine of `omega` [rad/s] or under an earthquake record (`omega` None)."""
 
     alpha_2: float
     omega: float | None

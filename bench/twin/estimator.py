@@ -263,7 +263,7 @@ class Estimator:
         )
 
     def _trace(self, seconds: float, u: Array, theta: Array, low: Array, high: Array) -> Array:
-        """Trace with the columns `bench.events.TWIN_TRACE`."""
+        """Trace with the columns `bench.live_values.TWIN_TRACE`."""
         n = low.size
         rows = np.arange(self._skip, n, self._every)
         self._skip = (self._skip - n) % self._every

@@ -108,7 +108,7 @@ def test_a_folder_of_others_is_not_removed(tmp_path: Path) -> None:
 def test_a_second_process_is_refused_until_the_first_has_ended(tmp_path: Path, inputs: object) -> None:
     folder = tmp_path / "map"
     first = MapStore(folder, {"omega": 1})
-    with pytest.raises(InvalidInput, match=rf"process {os.getpid()} writes its map there"):
+    with pytest.raises(InvalidInput, match=rf"process {os.getpid()} is writing its map there"):
         MapStore(folder, inputs)
     first.append(table(1.0, 2.0), state(1))
     discard(folder)
