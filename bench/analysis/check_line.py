@@ -7,7 +7,7 @@ from sim.parameters import Parameters, quantity
 
 
 class Verdict(StrEnum):
-    """Verdict of a line."""
+    """Verdict of a line: within or outside its tolerance, without a tolerance, or not measured."""
 
     PASSED = "passed"
     FAILED = "failed"

@@ -102,8 +102,8 @@ def fit_cycle(
 
 
 _SHARE = 16
-"""Fraction of a cycle to which a parabola is fitted. Its vertex is the peak, with averaged noise; the relative error of
-the vertex is 5e-6 for a sine and 3e-3 for a fifth harmonic.
+"""Reciprocal of the fraction of a cycle to which a parabola is fitted. Its vertex is the peak, with averaged noise; the
+relative error of the vertex is 5e-6 for a sine and 3e-3 for a fifth harmonic.
 """
 
 

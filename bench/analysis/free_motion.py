@@ -64,8 +64,9 @@ class Rate:
 
 @dataclass(frozen=True)
 class FreeMotion:
-    """Smallest, mean and largest peak of the drift per cycle [m]. `repeats` is the number of cycles after which the
-    motion repeats, 0 if it does not; `rate` is None if the changes are not those of a linear system.
+    """Smallest, mean and largest peak of the drift per cycle [m], over the last `cycles` cycles. `repeats` is the
+    number of cycles after which the motion repeats, 0 if it does not; `rate` is None if the changes are too few, too
+    noisy or not those of a linear system.
     """
 
     least: float

@@ -100,10 +100,10 @@ def steady_peak(
 
     Over a period of a steady motion the second storey gains no momentum, so the force k2 times drift, which alone
     drives it, has zero mean for any motion of the block. The mean is therefore a better zero of the sensors than a
-    reading at rest before the test, whose rounding error of each laser would enlarge the peak to one side. The scatter
-    is that of the cycles at the peak, corrected for the correlation of neighbouring cycles, M_eff = M (1 - r1) / (1 +
-    r1). A remaining transient is estimated from `cycles` and those `before` them at the same drive; `residual`, the
-    relative bound of a further systematic effect, is treated as a rectangular distribution. The harmonics of the
+    reading at rest before the test, in which the rounding error of each laser would enlarge the peak on one side. The
+    scatter is that of the cycles at the peak, corrected for the correlation of neighbouring cycles, M_eff = M (1 - r1)
+    / (1 + r1). A remaining transient is estimated from `cycles` and those `before` them at the same drive; `residual`,
+    the relative bound of a further systematic effect, is treated as a rectangular distribution. The harmonics of the
     readings of a linear `frame` check the linearity of the lasers.
     """
     waves = mean_waves(cycles, {DRIFT: PEAK_HARMONICS})

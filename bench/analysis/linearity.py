@@ -74,8 +74,8 @@ class Harmonics:
         """The harmonics with the additional uncertainty due to the `step` [m] of the readings, at most that of one
         rounding. Returns the same object for the same step.
 
-        The scatter of the cycles does not contain this uncertainty, since all cycles are rounded alike. By
-        `bench.analysis.gain.PEAK_ROUNDINGS` the variance of one harmonic is 2 zeta(3) q^3 / (pi^4 A), half of it in
+        The scatter of the cycles does not contain this uncertainty, since all cycles are rounded alike. As derived for
+        `bench.analysis.gain.PEAK_ROUNDINGS`, the variance of one harmonic is 2 zeta(3) q^3 / (pi^4 A), half of it in
         each part.
         """
         swing = max(0.5 * float(np.ptp(self.readings)), step, np.finfo(np.float64).tiny)

@@ -7,7 +7,7 @@ Near the periodic motion, the coefficients of cycle n are
 where y*, the vectors c_k, and one or two complex multipliers mu_k are unknown. All are fitted to the whole series at
 once: unlike a regression of each cycle on its predecessor, the fit is not biased by noise of the predecessor. For given
 multipliers the problem is linear, so that only these are iterated (variable projection, Golub and Pereyra, SIAM J.
-Numer. Anal. 10, 1973); the matrix pencil (Hua and Sarkar, IEEE Trans. ASSP 38, 1990) provides their first values.
+Numer. Anal. 10, 1973); the matrix pencil (Hua and Sarkar, IEEE Trans. ASSP 38, 1990) provides their initial values.
 """
 
 from dataclasses import dataclass
@@ -28,7 +28,7 @@ linear.
 """
 
 EVIDENCE = 20.0
-"""Decrease of the Bayesian information criterion for which a second pair is fitted."""
+"""Decrease of the Bayesian information criterion above which the fit with a second pair is used."""
 
 SIGNIFICANT = 3.0
 """Smallest norm of a pair's part of the series, relative to that expected of noise alone."""
@@ -60,7 +60,7 @@ class Multiplier:
 
     `cycles` is the number of cycles used, `pairs` the number of fitted pairs, `autocorrelation` that of the residual
     from one cycle to the next, and `coloured` the power of the residual near the angle of the pair, relative to its
-    mean. The uncertainties include this factor where it exceeds 1. `residual` is the rms residual of a coefficient, in
+    mean. Where it exceeds 1, the covariance is multiplied by it. `residual` is the rms residual of a coefficient, in
     the unit of the series.
     """
 
@@ -232,7 +232,7 @@ def _parts(series: Array, values: Array) -> Array:
 
 
 def _pencil(series: Array, pairs: int) -> Complex | None:
-    """First values of the multipliers, in the upper half plane; None if the series does not contain as many pairs."""
+    """Initial values of the multipliers, in the upper half plane; None if the series does not contain as many pairs."""
     changes = np.diff(series, axis=0)
     n = changes.shape[0]
     length = n // PENCIL

@@ -37,7 +37,7 @@ def noise_density(rest: Array, sample_rate: float) -> tuple[Array, Array]:
     """Frequencies [Hz] and one-sided spectral density [unit^2/Hz] of `rest`, shape (n,), without its linear trend."""
     from scipy import signal
 
-    # `Any`: scipy's stubs do not contain the linear trend
+    # `Any`: scipy's stubs do not declare the value "linear" of `detrend`
     tools: Any = signal
     frequency, power = tools.welch(rest, sample_rate, nperseg=max(rest.size // 4, 8), detrend="linear")
     return np.asarray(frequency), np.asarray(power)

@@ -78,8 +78,8 @@ def _changed(coupled: Specimen) -> Iterator[Specimen]:
 
 
 def _distance(one: Motion, other: Motion) -> float:
-    """Greatest difference between the samples of two motions, up to the end of the shorter one, relative to each state's
-    greatest magnitude.
+    """Greatest difference between the samples of two motions, up to the end of the shorter one, relative to each
+    state's greatest magnitude.
     """
     n = min(len(_samples(one)), len(_samples(other)))
     first, second = _samples(one)[:n], _samples(other)[:n]

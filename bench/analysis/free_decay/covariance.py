@@ -76,7 +76,7 @@ OWN, COMMON = ("noise", "table", "clock"), ("linearity", "masses", "timebase")
 """Sources that are independent between decays, and sources common to all decays."""
 
 _RATES = np.array([2.0, 2.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0])
-"""Exponents of the sample rate in the quantities of `modal.NAMES`."""
+"""Exponents of the sample rate in the quantities of `response.NAMES`."""
 
 SEGMENT = 4.0
 """Duration of the segments for the spectrum of the residual [s]."""
@@ -100,7 +100,7 @@ class Errors:
 
 @dataclass(frozen=True, eq=False)
 class Uncertainty:
-    """Covariances of the quantities of `modal.NAMES`, shape (n, n), by contribution.
+    """Covariances of the quantities of `response.NAMES`, shape (n, n), by contribution.
 
     `mass_shift`, shape (n, 2), is the sensitivity to the masses, and `time_shift`, shape (n,), is the shift due to one
     standard uncertainty of the timebase.

@@ -44,8 +44,8 @@ class Setting:
 
 @dataclass(frozen=True, eq=False)
 class Decay:
-    """One decay: the `quantities` of `modal.NAMES`, shape (8,), their uncertainty, the underlying fit, the damping of
-    each mode against its amplitude, and the end of the excitation (`begin` [s]).
+    """One decay: the `quantities` of `response.NAMES`, shape (8,), their uncertainty, the underlying fit, the damping
+    of each mode against its amplitude, and the end of the excitation (`begin` [s]).
 
     `peak` [m] is the largest drift.
     """

@@ -95,8 +95,8 @@ class Shown:
 
 
 GAIN_UNCERTAINTY, DELAY_UNCERTAINTY = 0.01, 2e-3
-"""Standard uncertainties of the lasers' gain, expected to be 1, and of their delay after the table's sensor, expected
-to be 0 [s].
+"""Standard uncertainties of the lasers' gain, expected to be 1, and of their delay relative to the table's sensor,
+expected to be 0 [s].
 """
 
 BEND_UNCERTAINTY = 1e-3

@@ -56,7 +56,7 @@ class Tilt:
 
 
 def analyse_tilt(recording: Recording, specimen: Specimen, least: float) -> Tilt:
-    """Analyse a recording down to the swing whose largest angle is below `least` [rad].
+    """Analyse a recording up to the first half swing whose largest angle is below `least` [rad].
 
     Raises NotRocking, with a remedy, if the recording does not show free rocking.
     """
