@@ -112,7 +112,7 @@ def table_delay_lines(
 
 
 def _delay_between(omega: NDArray[np.float64], first: Amplitudes, second: Amplitudes) -> CommonMotion:
-    # the cycles' amplitudes rotate with exp(-i omega t)
+    # the amplitudes are for exp(-i omega t), those of `common_motion` for exp(+i omega t)
     return common_motion(omega, first.conj(), second.conj())
 
 

@@ -58,7 +58,8 @@ def resting_lines(samples: RestSamples, parameters: CheckParameters, accuracy: S
 def safety_lines(configuration: BenchConfiguration) -> Iterator[CheckLine]:
     """One line for each safety input after the acquisition at rest; none for a simulated bench.
 
-    They always pass, since an open input would have prevented arming or ended the check.
+    Inputs that are read have passed, since an open input would have prevented arming or ended the check; missing inputs
+    are untested.
     """
     if configuration.backend != "hardware":
         return
@@ -132,11 +133,11 @@ def dead_time(
 ) -> float:
     """Signed delay [s] between drive and motion not explained by mass, dashpot and spring, up to twice `longest`.
 
-    drive / acceleration = (m + c / s + k / s^2) / G exp(s T) with s = i omega. For each T, the three quotients are
-    fitted by linear least squares; the result is the T with the smallest residual. It includes the delays of the
-    inputs' filters and of the amplifier, and half a sample.
+    drive / acceleration = exp(s T) (m + c / s + k / s^2) / G with s = i omega. For each T, the quotients m / G, c / G
+    and k / G are fitted by linear least squares; the result is the T with the smallest residual. It includes the delays
+    of the inputs' filters and of the amplifier, and half a sample.
     """
-    # the cycles' amplitudes rotate with exp(-i omega t)
+    # the amplitudes of the cycles are for exp(-i omega t)
     wanted = np.conj(drive / acceleration)
     s = 1j * omega
     magnitude = np.abs(wanted)

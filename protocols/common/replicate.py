@@ -55,11 +55,11 @@ class Replicated:
     """Result of a replication: the best `drive` [V] and its table acceleration [m/s2], both of the target's shape.
 
     `acceleration` was measured in the last accepted pass; None if there is none. `repeatable` is the relative rms error
-    of the best drive, excluding noise (1 without a pass); `spectrum_error` is the largest deviation of the response
-    spectrum that noise does not explain, with its period [s].
+    of the best drive, excluding noise (about 1 without a pass); `spectrum_error` is the largest deviation of the
+    response spectrum that noise does not explain, with its period [s].
 
-    `status` and `reason` describe how the passes ended. The status is "running" if the block `fell` before the end; it
-    then lies in its catch, and the caller must have it set upright.
+    `status` and `reason` describe how the passes ended. The status is "running" if the block `fell` before the end; the
+    block then lies in its catch, and the caller must have it set upright.
     """
 
     drive: Array

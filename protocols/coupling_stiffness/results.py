@@ -36,7 +36,7 @@ _COLUMNS = (
 )
 
 SHOWN = 6.0
-"""Time of a decay that is drawn after the pulse [s], long enough to show both modes."""
+"""Length of the drawn part of a decay, from the end of the pulse [s], long enough to show both modes."""
 
 
 def springs_table(points: Sequence[SpringPoint]) -> str:

@@ -198,7 +198,7 @@ def _statement(campaign: Campaign, points: Sequence[Mapping[str, Any]]) -> list[
 Floats = NDArray[np.float64]
 
 QUIET = 1.5
-"""Time at the start of a run in which the signals are zeroed [s]; the table is at rest for 2 s."""
+"""Time at the start of a run in which the signals are zeroed [s]; by default, the table is at rest for 2 s."""
 
 
 @dataclass(frozen=True)

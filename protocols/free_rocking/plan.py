@@ -55,7 +55,7 @@ _OVERHEAD = 20.0
 """Time for a tilt in addition to its recording [s], in which the operator tilts the block and starts the recording."""
 
 _LEAST_LOSS = 0.8
-"""Smallest velocity loss per impact, relative to the theoretical loss, for which the recording suffices."""
+"""Smallest velocity loss per impact, relative to the theoretical loss, for which the recording is long enough."""
 
 
 @dataclass(frozen=True)
@@ -173,7 +173,7 @@ class RockingRun:
         return (
             f"Tilt {number} of {len(self._planned)}: tilt the block {where} until its face has moved by about "
             f"{1e3 * abs(tilt.displacement):.0f} mm at the laser beam ({degrees(abs(tilt.angle)):.1f} degrees), "
-            "and hold it still on its edge. Then confirm. When the recording runs, count to three and release "
+            "and hold it still on its edge. Then confirm. Once the recording is running, count to three and release "
             "the block abruptly, without a push; then touch nothing until the block is at rest."
         )
 

@@ -109,8 +109,8 @@ def _combined(point: RockingPoint) -> list[str]:
         f"r_exp / r_th = {point.ratio:.6f} +- {point.ratio_uncertainty:.1g} (k = 2){by}, r_th = {point.r_th:.6f}"
         f"{birge}",
         f"change of r with impact velocity: {trend[0]} +- {trend[1]}",
-        f"alpha = {alpha[0]} +- {alpha[1]} rad, from the sides {point.alpha_sides_rad:.6f} rad",
-        f"p = {p[0]} +- {p[1]} rad/s, from the sides {point.p_sides_rad_s:.5f} rad/s",
+        f"alpha = {alpha[0]} +- {alpha[1]} rad from the motion; {point.alpha_sides_rad:.6f} rad from the sides",
+        f"p = {p[0]} +- {p[1]} rad/s from the motion; {point.p_sides_rad_s:.5f} rad/s from the sides",
         *([f"check: {point.remarks}"] if point.remarks else []),
     ]
 

@@ -121,7 +121,9 @@ class HarmonicCampaign(Prepared[HarmonicParameters]):
         return self._motions[beta, omega]
 
     def _check_table(self) -> None:
-        """Check the table's motion (x = a / Omega^2), including the overshoot of a start, against limits and stroke."""
+        """Raise InvalidInput if the table's motion (x = a / Omega^2), including the overshoot of a start, exceeds a
+        limit or the stroke, or if the settle limit is too short for the detection of a steady state.
+        """
         parameters, configuration = self.parameters, self.configuration
         limits, stroke = configuration.limits, configuration.half_stroke
         peak = max(OVERSHOOTS) * self._amplitude

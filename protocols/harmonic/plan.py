@@ -76,7 +76,8 @@ class HarmonicPlan:
             if not settled.steadiness.steady:
                 yield Publish(
                     Warned(
-                        f"the bare frame is not steady at {omega:g} rad/s: no gain can be determined at this frequency"
+                        f"the bare frame is not steady at {omega:g} rad/s: its drift is not a valid reference for "
+                        "the gains at this frequency"
                     )
                 )
             self._bare[omega] = settled
@@ -101,8 +102,8 @@ class HarmonicPlan:
     def _point(
         self, specimen: Specimen, omega: float, calibration: DriveCalibration, starts: Sequence[Start]
     ) -> Generator[Step, Outcome, HarmonicPoint]:
-        """Try the planned starts; returns the first steady rocking motion, otherwise the first motion without a
-        fall.
+        """Try the planned starts. Returns the first steady or held rocking motion or, if there is none or the predicted
+        orbit is not stable, the first motion without a fall.
         """
         found: HarmonicPoint | None = None
         falls = 0

@@ -85,7 +85,7 @@ class HarmonicFollower:
         return self._points
 
     def before(self, step: Step) -> None:
-        """Start a series at its first dwell, and end it at the next sweep."""
+        """Start a series at its first dwell or at the start of a hold, and end it at the next sweep or arming."""
         match step:
             case Arm() | Sweep():
                 self._end_series(self._series)

@@ -82,7 +82,7 @@ def _spectra_section(campaign: Campaign) -> Section | None:
 
 
 def _holds_section(campaign: Campaign) -> Section | None:
-    """Deviation and control of every held point; None without held points."""
+    """Peak drift and control of every held point; None without held points."""
     held = [row for row in campaign.harmonic_points if row["status"] == "held"]
     cycles = campaign.record.columns_of(HoldCycle)
     if not held or not cycles.get("cycle"):
@@ -126,9 +126,10 @@ def _histories(campaign: Campaign, points: Sequence[Mapping[str, Any]]) -> list[
         else:
             drawn.append(motion)
     parts: list[Part] = [
-        "The curves are the last measured cycles from the raw channels, relative to the values at rest, in "
-        "phase with the measured table acceleration, including the delays of the sensors. u₁ is relative to the "
-        "table. ϑ is not measured; it and the thin dotted curves are predicted for the achieved amplitude."
+        "The curves are the last measured cycles from the raw channels, relative to the values at rest. They start at "
+        "an upward zero crossing of the fundamental of the measured table acceleration; delays of the sensors are not "
+        "corrected. u₁ is relative to the table. ϑ is not measured; it and the thin dotted curves are predicted for "
+        "the achieved amplitude."
     ]
     for beta in sorted({motion.beta for motion in drawn}):
         of_spring = [motion for motion in drawn if motion.beta == beta]

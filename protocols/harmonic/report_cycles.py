@@ -60,7 +60,8 @@ class Predicted:
 
 @dataclass(frozen=True, eq=False)
 class MeasuredMotion:
-    """Measured cycles of a point; `time` [s], shape (n,), starts at an upward zero crossing of the table acceleration.
+    """Measured cycles of a point; `time` [s], shape (n,), starts at an upward zero crossing of the fundamental of the
+    table acceleration.
 
     `drift`, `bare_drift` and `u1` [m], shape (n,), are NaN where samples are missing; `bare_drift` is the drift of the
     bare frame at the same phase, None if it is not found. `predicted` is None if the model has no such motion.
@@ -78,7 +79,9 @@ class MeasuredMotion:
 
 @dataclass(frozen=True, eq=False)
 class Cycles:
-    """Periods of one test, in phase with the table: drift and u1 [m], shape (n,) each, NaN for lost samples."""
+    """Periods of one test from an upward zero crossing of the fundamental of the table acceleration on: drift and u1
+    [m], shape (n,) each, NaN for lost samples.
+    """
 
     drift: Floats
     u1: Floats
@@ -119,7 +122,7 @@ class Dwells:
         return min(whole, key=lambda each: abs(float(np.nanmax(np.abs(each.drift))) - peak))
 
     def _last_cycles(self, end: float, omega: float) -> Cycles | None:
-        """Last complete periods before `end` [s of bench time], in phase with the table; None if there are none."""
+        """Last complete periods before `end` [s of bench time]; None if there are none."""
         block = bisect_right(self._blocks["time"], end + 1e-6) - 1
         if block < 0:
             return None

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MARGIN = 1.05
-"""Allowance for an amplitude larger than the requested one, which must be within the limits, too."""
+"""Factor on the requested amplitude; the larger amplitude must also be within the limits."""
 
 _COLUMNS = (
     TextColumn("sensor", words=True),
@@ -43,7 +43,7 @@ _COLUMNS = (
     TextColumn("covered", "mm"),
     TextColumn("order", "1"),
     TextColumn("largest error", "um"),
-    TextColumn("left, U", "um"),
+    TextColumn("U (k=2)", "um"),
     TextColumn("delay", "ms"),
 )
 

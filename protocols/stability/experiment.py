@@ -139,9 +139,9 @@ class StabilityTest(Prepared[StabilityParameters]):
                 np.array([each.factor for each in places]), "1", "amplitude relative to the uplift acceleration"
             ),
             "fixed_modulus": Column(np.abs(fixed), "1", "greatest |Floquet multiplier| on fixed ground"),
-            "fixed_angle_rad": Column(np.abs(np.angle(fixed)), "rad", "its argument"),
+            "fixed_angle_rad": Column(np.abs(np.angle(fixed)), "rad", "argument of this multiplier on fixed ground"),
             "table_modulus": Column(np.abs(table), "1", "greatest |Floquet multiplier| on the simulated table"),
-            "table_angle_rad": Column(np.abs(np.angle(table)), "rad", "its argument"),
+            "table_angle_rad": Column(np.abs(np.angle(table)), "rad", "argument of this multiplier on the table"),
         }
 
     def _curve(self) -> list[Place]:

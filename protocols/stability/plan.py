@@ -121,7 +121,7 @@ class StabilityPlan:
                 return
 
     def next_middle(self) -> Place | None:
-        """Middle of the widest bracket of a boundary that is still too wide."""
+        """Middle of the widest bracket of a boundary that is still too wide; None if there is none."""
         known = sorted((each for each in self.points if each.modulus is not None), key=self._position)
         open_brackets = [
             (b - a, 0.5 * (a + b))

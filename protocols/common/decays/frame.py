@@ -1,4 +1,4 @@
-"""Combination of decays: the quantities `modal.NAMES` and the slopes of the damping, with all covariances."""
+"""Combination of decays: the quantities `response.NAMES` and the slopes of the damping, with all covariances."""
 
 import json
 from collections.abc import Mapping, Sequence

@@ -30,7 +30,7 @@ REST = 2.0
 """Time at rest before each pulse, in which the signals are zeroed [s]."""
 
 STILL = 5e-5
-"""Scatter below which the storeys are considered at rest [m]; larger than the resolution of a laser."""
+"""Scatter below which the storeys are considered at rest [m]; larger than that due to the resolution of a laser."""
 
 WAITING = 45.0
 """Expected time of a recording in addition to its drive: settling of the storeys, rest, ramp [s]."""

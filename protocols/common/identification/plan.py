@@ -178,8 +178,8 @@ PROBES = 3
 """Number of probes that most tables need, used for the expected duration."""
 
 SENSORS_AGREE = 0.05
-"""Relative difference of the table's two sensors, or phase difference [rad] at the band edge, above which a warning is
-issued.
+"""Relative difference of the table's two sensors, or phase difference [rad] at the lower end of the band, above which a
+warning is issued.
 """
 
 
