@@ -42,8 +42,8 @@ PENCIL = 3
 """Ratio of the number of cycles to the row length of the matrix pencil."""
 
 NEAR, FAR = 2, 6
-"""Frequencies next to that of the pair, in units of 1 / n per cycle, at which the spectrum of the residual is compared
-with its mean. The fit reduces those closer than `NEAR`.
+"""Smallest and largest distance from the frequency of the pair, in units of 1 / n per cycle, at which the spectrum of
+the residual is compared with its mean. At smaller distances, the fit reduces the residual.
 """
 
 PASSES = 3

@@ -18,7 +18,7 @@ SPREAD = 5.0
 """Largest deviation of a cycle of a steady motion from the mean of its window [tolerances]."""
 
 KIN_SHARE = 0.25
-"""Fraction of the other storey's motion relative to which a storey that hardly moves is assessed."""
+"""A storey that hardly moves is assessed relative to this fraction of the other storey's motion."""
 
 
 @dataclass(frozen=True)

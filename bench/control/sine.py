@@ -101,8 +101,8 @@ GAIN = 0.9
 """Fraction of an error removed by one step, below 1 because gains are uncertain."""
 
 PATIENCE = 6
-"""Number of steps after which the fraction `GAIN` is divided by 1, 2, 3 and so on. The mean of a non-repeating motion
-is then corrected; a correction of each deviation would change the motion.
+"""Number of steps after which the fraction `GAIN` is divided by 1, 2, 3 and so on, so that the corrections are
+averaged: correcting every deviation of a non-repeating motion would change that motion.
 """
 
 LARGEST_STEP = 0.10

@@ -236,7 +236,7 @@ UNKNOWN_SHAKER = {
     "current": "the force constant is unknown: set hardware.moving_mass and hardware.force_constant",
     "heating": "the force constant is unknown: set hardware.moving_mass and hardware.force_constant",
 }
-"""Reason, by quantity of the shaker, why it is not predicted."""
+"""Reasons why demands on the shaker are not predicted, by quantity."""
 
 
 UNPROBED = {
@@ -244,7 +244,7 @@ UNPROBED = {
     "drive_slew": "unknown table: determined by the probes, within limits.drive_slew",
     **UNKNOWN_SHAKER,
 }
-"""Reason, by quantity, why it is not predicted for a table that the run itself probes."""
+"""Reasons why demands are not predicted for a table that the run itself probes, by quantity."""
 
 
 def demands_of(known: Mapping[str, float], where: str, configuration: BenchConfiguration) -> tuple[Demand, ...]:

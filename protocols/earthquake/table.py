@@ -16,7 +16,7 @@ from protocols.earthquake.records import FileSources, band_used
 from sim.errors import InvalidInput
 
 PERIOD, LONGEST = 8.0, 120.0
-"""Period of the identification [s], and its maximum, which a low first octave may need."""
+"""Usual and longest period of the identification [s]; a low band requires more than the usual one."""
 
 OCTAVE_LINES = 4
 """Minimum number of lines in the lowest octave of the identification, which has the fewest lines."""
