@@ -96,7 +96,7 @@ class MapStore:
 
     def remove(self) -> None:
         """Remove the folder of a map whose results have been written. Its table must no longer be referenced."""
-        # Windows does not remove mapped files, which a reference in a cycle, as in a figure, would keep mapped
+        # Windows cannot remove a mapped file, and a reference cycle, as in a figure, would keep the file mapped
         gc.collect()
         _remove(self.folder, self._lock)
 

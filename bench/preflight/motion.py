@@ -73,7 +73,7 @@ def resting_demands(
     made = {name: np.fft.irfft(spectrum, size)[: acceleration.size] for name, spectrum in series.items()}
     found = peaks(made)
     if "current" in made:
-        # rms over the record: conservative, because the guard averages over a longer time
+        # rms over the record: at least the mean of the guard if the record is stationary or short for its time constant
         found["heating"] = float(np.sqrt(np.mean(made["current"] ** 2)))
     return found
 

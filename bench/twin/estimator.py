@@ -181,7 +181,7 @@ class Estimator:
 
     def __init__(self, run: int, setting: Setting, members: Members) -> None:
         self._run, self._setting = run, setting
-        # delay the acceleration by the lag of the lasers
+        # delay the table's signals by the lag of the lasers
         lasers = max(0.0, *(-lag for lag in setting.lag))
         self._resampler = Resampler(setting.sample_rate, (*(lasers + lag for lag in setting.lag), lasers, lasers))
         dt = self._resampler.dt

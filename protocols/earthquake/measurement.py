@@ -230,7 +230,7 @@ def _running_gain(bare: History, coupled: History) -> Array:
     size = bare.drift.size
     below = running_peak(bare.drift)
     gain = np.full(size, nan)
-    # no gain after the block topples, although the peak before remains
+    # no gain after the block topples, although the earlier peak remains
     np.divide(running_peak(coupled.padded(size)), below, out=gain, where=below > 0.0)
     return np.where(np.isnan(coupled.padded(size)), nan, gain)
 

@@ -137,7 +137,7 @@ def identified_specimen(found: Findings, tilts: int, block: Block, known: Identi
         name="restitution_factor",
         value=r.value / theory,
         standard_uncertainty=r.uncertainty / theory,
-        source=f"free rocking, {tilts} tilts, by the {by}: r_exp = {r.value:.6f} of a block of {sides}",
+        source=f"free rocking, {tilts} tilts, from the {by}: r_exp = {r.value:.6f} of a block of {sides}",
         date=datetime.now(UTC).replace(microsecond=0),
     )
     return (known or Identified()).extended([finding])

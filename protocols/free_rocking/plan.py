@@ -146,7 +146,7 @@ class RockingRun:
     @property
     def _watching(self) -> str:
         return (
-            "Remove the spring and set the block upright on its base, without contact to other parts. Aim laser 2 at "
+            "Remove the spring and set the block upright on its base, without contact with other parts. Aim laser 2 at "
             f"its face, square to it, {1e3 * self._parameters.height:.0f} mm above the table, near the middle of its "
             "range."
         )
@@ -207,7 +207,7 @@ class RockingRun:
         found = analyse_tilt(seen, self._specimen, p.least_swing * abs(angle))
         if found.swings.held * angle < 0.0:
             raise NotRocking(
-                f"the laser measures {found.swings.held:+.3f} rad, but {angle:+.3f} rad are requested: tilt the "
+                f"the laser measures {found.swings.held:+.3f} rad, but {angle:+.3f} rad is requested: tilt the "
                 "block to the other side, or check hardware.laser_2.polarity: displacements towards the frame are "
                 "positive"
             )

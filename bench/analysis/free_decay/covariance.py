@@ -197,7 +197,7 @@ def _table(fit: Fit, quiet: float) -> Array:
         return np.zeros_like(fit.inverse)
     lines = np.fft.rfftfreq(rest.size, fit.stretch.step)
     power = np.abs(np.fft.rfft(rest - rest.mean())) ** 2 / rest.size
-    # only up to the modes, because filters and averaging have reduced the noise above them
+    # only up to `BAND`, because filters and averaging have reduced the noise above it
     variance = float(power[(lines > 0.0) & (lines <= BAND)].mean())
     response = fit.response
     response_to_scores = np.array(

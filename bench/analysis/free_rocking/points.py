@@ -60,7 +60,7 @@ def find_points(seen: Recording, swings: Swings, zero: float) -> Points:
     impacts: list[tuple[float, float]] = []
     turns: list[tuple[float, float]] = []
     for number, crossing in enumerate(swings.crossings):
-        # the last half swing is not followed by an impact: its duration is at most that of the previous one
+        # the end of the last half swing is not known: its duration is at most that of the previous one
         length = marks[number + 1] - crossing if number + 1 < swings.crossings.size else crossing - marks[number - 1]
         window = min(_WINDOW, _PART * float(length))
         impacts.append(_impact(times, angle, float(crossing), window))

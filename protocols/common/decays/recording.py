@@ -120,7 +120,7 @@ def find_level(
             return (yield from _accept(left * volts, left * seen, drift, binds))
         volts *= min(GROWTH, left)
     raise Unmeasurable(
-        f"after {_MOST} probes the drift is {1e3 * seen:.2g} mm, but {1e3 * drift:.2g} mm are required: check "
+        f"after {_MOST} probes the drift is {1e3 * seen:.2g} mm, but {1e3 * drift:.2g} mm is required: check "
         "the amplifier's gain and the guides of the table"
     )
 
@@ -133,7 +133,7 @@ def _accept(volts: float, seen: float, drift: float, binds: str) -> Generator[St
         )
     if seen < 0.9 * drift:
         yield Publish(
-            Warned(f"{binds} allows a drift of only {1e3 * seen:.2g} mm, but {1e3 * drift:.2g} mm are requested")
+            Warned(f"{binds} allows a drift of only {1e3 * seen:.2g} mm, but {1e3 * drift:.2g} mm is requested")
         )
     return volts
 
