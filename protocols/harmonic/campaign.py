@@ -277,7 +277,9 @@ def _remarks(rows: list[dict[str, Any]]) -> list[str]:
     orbits = [row["orbit_agrees"] for row in rows if row.get("orbit_agrees") is not None and row.get("agrees") is None]
     if orbits:
         verdict = counted(len(orbits) - sum(orbits), "disagrees", "disagree")
-        lines.append(f"{len(orbits)} more compared by the gain of the orbit about which they revolve, {verdict}.")
+        lines.append(
+            f"{len(orbits)} more compared by the gain of the orbit about which their motion revolves, {verdict}."
+        )
     known = [row for row in rows if row.get("dominating") and row.get("alpha_2")]
     if known:
         shares = [100.0 * row["alpha_2_uncertainty"] / row["alpha_2"] for row in known]
