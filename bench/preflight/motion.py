@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.config.model import BenchConfiguration
-from bench.guard.shaker import Motion, ShakerModel
+from bench.guard.shaker import Motion, ShakerModel, exponential_mean
 from sim.channel import STOREYS
 from sim.linear import frame_matrices
 from sim.specimen import Specimen
@@ -73,8 +73,12 @@ def resting_demands(
     made = {name: np.fft.irfft(spectrum, size)[: acceleration.size] for name, spectrum in series.items()}
     found = peaks(made)
     if "current" in made:
-        # rms over the record: at least the mean of the guard if the record is stationary or short for its time constant
-        found["heating"] = float(np.sqrt(np.mean(made["current"] ** 2)))
+        # the guard's exponential mean, and the rms over the record, which exceeds it in a record that is short for the
+        # time constant and may follow others
+        squares = made["current"] ** 2
+        forget = float(np.exp(-1.0 / (configuration.limits.heating_time * sample_rate)))
+        greatest = max(float(exponential_mean(squares, forget)[0].max()), float(np.mean(squares)))
+        found["heating"] = float(np.sqrt(greatest))
     return found
 
 

@@ -156,7 +156,7 @@ class RockingRun:
         request = self._request(number, tilt)
         for attempt in range(self._parameters.attempts):
             yield Publish(StepStarted(f"tilt {number}: {degrees(tilt.angle):+.1f} degrees, block held and released"))
-            again = "" if attempt == 0 else "The last recording was not usable.  "
+            again = "" if attempt == 0 else "The last recording was not usable. "
             yield OperatorAction(OperatorTask.TILT_BLOCK, self._specimen.coupled(0.0), again + request, tilt.angle)
             played = yield from self._record(number, tilt)
             try:

@@ -24,6 +24,7 @@ from bench.preflight.margins import Forecast
 from bench.preflight.motion import laser_demands
 from bench.protocol import Plan, Prepared, Result, Sources
 from drivers.rig import OperatorTask
+from protocols.common.calibrate import Unmeasurable
 from protocols.laser_calibration.fit import ErrorCurve
 from protocols.laser_calibration.plan import START, expected_duration, measure, planned_passes
 from protocols.laser_calibration.protocol import CalibratedSensor, LaserCalibrationParameters
@@ -127,10 +128,16 @@ class LaserCalibrationRun(Prepared[LaserCalibrationParameters]):
         return self.collected(self._steps())
 
     def _steps(self) -> Generator[Step, Outcome, None]:
-        """Steps: clamp the storeys to the table, measure, publish, remove the clamps."""
+        """Steps: clamp the storeys to the table, measure, publish, remove the clamps. Raises Unmeasurable, after the
+        clamps are removed, if the response is insufficient.
+        """
         bare = self.configuration.known_specimen.bare()
         yield OperatorAction(OperatorTask.LOCK_FRAME, bare, _CLAMP)
-        found, curves = yield from measure(self.parameters, self.configuration)
+        try:
+            found, curves = yield from measure(self.parameters, self.configuration)
+        except Unmeasurable:
+            yield OperatorAction(OperatorTask.UNLOCK_FRAME, bare, _UNCLAMP)
+            raise
         self._found, self._curves = found, curves
         for number, (curve, laser) in enumerate(zip(curves, found.lasers, strict=True), 1):
             yield Publish(_fit_event(f"laser_{number}", curve, laser.delay, laser.delay_uncertainty))

@@ -229,3 +229,26 @@ def test_a_real_table_is_predicted_from_its_identification_only(tmp_path: Path) 
     assert identified.gain(np.array([12.5]), 3.0) == pytest.approx([5.0])
     with pytest.raises(InvalidInput, match="wider band"):
         identified.gain(np.array([100.0]), 3.0)
+
+
+def test_the_heating_of_a_long_record_is_that_of_its_strong_part() -> None:
+    """A strong 60 s in 600 s, against the guard's running mean as a loop over samples."""
+    from bench.preflight.motion import resting_demands
+    from sim.specimen import Specimen
+
+    rate = 50.0
+    t = np.arange(0.0, 600.0, 1.0 / rate)
+    strong = np.exp(-(((t - 300.0) / 30.0) ** 2))
+    acceleration = 0.4 * strong * np.sin(12.0 * t)
+    shaker = CONFIGURATION.shaker_model
+    assert shaker is not None
+    found = resting_demands(acceleration, rate, Specimen().bare(), CONFIGURATION)
+    displacement = -acceleration / 12.0**2
+    mean = greatest = 0.0
+    forget = np.exp(-1.0 / (CONFIGURATION.limits.heating_time * rate))
+    for square in shaker.current(acceleration, displacement) ** 2:
+        mean = forget * mean + (1.0 - forget) * square
+        greatest = max(greatest, mean)
+    rms = float(np.sqrt(np.mean(shaker.current(acceleration, displacement) ** 2)))
+    assert found["heating"] == pytest.approx(np.sqrt(greatest), rel=5e-3)
+    assert found["heating"] > 1.5 * rms

@@ -17,9 +17,12 @@ from bench.config.result_files import read_calibration, write_calibration
 from bench.config.template import as_toml
 from bench.config.toml import read_configuration
 from bench.datafile.reader import open_datafile
-from drivers.rig import Channel
+from bench.engine.steps import AcquireAtRest, Done, OperatorAction, RestSamples
+from drivers.rig import Channel, OperatorTask
+from protocols.common.calibrate import Unmeasurable
 from protocols.laser_calibration.fit import Pass, calibration, fit_curve
 from protocols.laser_calibration.protocol import LaserCalibrationParameters
+from sim.channel import STOREYS
 from sim.errors import InvalidInput
 
 PROTOCOL = load_protocol("laser-calibration")
@@ -227,6 +230,24 @@ def test_what_cannot_be_calibrated_is_refused(
 def test_an_older_calibration_is_not_calibrated_again() -> None:
     with pytest.raises(InvalidInput, match="remove it from the configuration"):
         PROTOCOL.prepare(LaserCalibrationParameters(), BenchConfiguration(calibrated=found()), None)
+
+
+def test_the_clamps_are_removed_when_a_laser_has_no_reading() -> None:
+    plan = PROTOCOL.prepare(LaserCalibrationParameters(), BenchConfiguration(), None).plan()
+    asked = list[OperatorTask]()
+    blind = tuple(Channel(name, "displacement", "m", 1e-5, 0.0, (-10, 10), "laser") for name in STOREYS)
+
+    def carry_out() -> None:
+        step = next(plan)
+        while True:
+            if isinstance(step, OperatorAction):
+                asked.append(step.work)
+            at_rest = isinstance(step, AcquireAtRest)
+            step = plan.send(RestSamples(blind, np.full((9, 2), 99, np.int16), None) if at_rest else Done())
+
+    with pytest.raises(Unmeasurable, match="no valid reading at rest"):
+        carry_out()
+    assert asked == [OperatorTask.LOCK_FRAME, OperatorTask.UNLOCK_FRAME]
 
 
 def test_a_calibration_on_the_simulated_bench_agrees_with_its_lasers_and_serves_other_runs(
