@@ -72,7 +72,11 @@ def stability_table(points: Sequence[StabilityPoint], curve: Curve) -> str:
         return "No point was measured."
     rows = sorted(points, key=lambda point: (point.omega_rad_s, point.amplitude_factor))
     lines = [text_table(_COLUMNS, map(_cells, rows)), "", *boundary_texts(rows, curve)]
-    lines += [f"{point.omega_rad_s:g} rad/s: {point.reason}" for point in rows if point.reason]
+    lines += [
+        f"{point.omega_rad_s:g} rad/s, amplitude factor {point.amplitude_factor:g}: {point.reason}"
+        for point in rows
+        if point.reason
+    ]
     return "\n".join(lines)
 
 
