@@ -59,8 +59,8 @@ class FitFinished(Event):
     """A model was fitted to a section of a recording; `name` is short and unique within a session, `text` is one line.
 
     `columns` holds series of equal length by name: first the axis (such as time), then the measured values and, for
-    comparison, the fitted values, residuals and so on. Raises ValueError unless all names are valid in a data file.
-    Stored by `bench.datafile.findings_tables`.
+    comparison, the fitted values, residuals and so on. Raises ValueError for series of unequal length, and for a name
+    that is not valid in a data file. Stored by `bench.datafile.findings_tables`.
     """
 
     name: str

@@ -64,10 +64,11 @@ class TwinEstimate(Event):
     start of `run`. `time` is the instant at which the block with that sample had been read.
 
     Names that end in `_low` and `_high` denote the ends of the model's band, those in `_measured` the values of the
-    lasers. `alpha_2` is available once the protocol has published a gain. `residual` is the root mean square of
-    measured minus modelled drift over the last second, `excess` that of the measured drift outside the band, both
-    relative to the largest drift so far. The band is formed by `members` models together with the nominal model. Values
-    that are not available are NaN.
+    lasers. `alpha_2` is available once the protocol has published a gain. `residual` is the root mean square (rms) of
+    measured minus modelled drift over the last second, `excess` that of the distance of the measured drift from the
+    band, which is 0 within the band. Both are divided by the largest rms of the measured drift over 1 s since arming,
+    or by the uncertainty of the measured drift if that is larger. The band is formed by `members` models together with
+    the nominal model. Values that are not available are NaN.
 
     `trace`, shape (n, 6), is the model's motion since the previous estimate, every 10 ms, with the columns TWIN_TRACE.
     """
@@ -98,6 +99,10 @@ class TwinEstimate(Event):
     alpha_2_high: float = column("1", "gain of the peak drift, coupled over bare, upper end of the model's band")
     alpha_2_measured: float = column("1", "measured gain of the peak drift, coupled over bare")
     theta: float = column("rad", "rocking angle of the model")
-    residual: float = column("1", "rms of measured minus modelled drift over 1 s, relative to the largest drift")
-    excess: float = column("1", "rms of the measured drift outside the band over 1 s, relative to the largest drift")
+    residual: float = column(
+        "1", "rms of measured minus modelled drift over 1 s, relative to the largest rms of the measured drift"
+    )
+    excess: float = column(
+        "1", "rms of the measured drift's excess over the band over 1 s, relative to the largest rms of that drift"
+    )
     trace: Array

@@ -116,7 +116,7 @@ class Prepared(ABC, Generic[P]):
 
     @abstractmethod
     def plan(self) -> Plan:
-        """All steps of the run, from a generator that returns the result."""
+        """Generator that yields the steps of the run and returns its result."""
 
     def collected(self, steps: 'Generator["Step", "Outcome", object]') -> Plan:
         """Yield `steps` and return the result computed from the points that they publish."""
@@ -135,7 +135,7 @@ class Prepared(ABC, Generic[P]):
 
     @abstractmethod
     def result(self, points: Sequence[Parameters]) -> Result:
-        """Result of an interrupted run from the points already published."""
+        """Result of a run, complete or interrupted, from the points that it published."""
 
 
 class Follower(Interface):
@@ -204,9 +204,9 @@ class RunView:
 class Protocol(Generic[P]):
     """An experiment. Flags, form, file metadata and documentation are generated from `parameters`, tables from `point`.
 
-    `prepare` takes the parameters, the bench configuration, and the tables of a data file that is replayed or analysed
-    again, else None. It raises InvalidInput for parameters beyond the capabilities of the bench. Listing the protocols
-    imports this object: wrap a `prepare` with heavy imports in `deferred`.
+    `prepare` takes the parameters, the bench configuration and, for a replay or re-analysis, the tables of the data
+    file, otherwise None. It raises InvalidInput for parameters beyond the capabilities of the bench. Listing the
+    protocols imports this object: wrap a `prepare` with heavy imports in `deferred`.
 
     `events` lists, as "module:Event", the events that the protocol declares and that have a table in the data file.
     `example` holds arguments shown in the help. `figures` and `files` name all files that a run may write in addition
@@ -240,7 +240,7 @@ class Protocol(Generic[P]):
 
 
 def deferred(reference: str) -> Callable[..., Any]:
-    """Function or class `module:name`, written as in an entry point and imported at the first call."""
+    """Callable that imports and calls the function or class `module:name`, written as in an entry point."""
     module, name = reference.split(":")
 
     def call(*args: Any, **kwargs: Any) -> Any:

@@ -14,8 +14,8 @@ def software() -> dict[str, str]:
 
 
 def revision() -> str:
-    """Git hash of this program, followed by "+" if there are uncommitted changes; "unknown" outside a repository or
-    package.
+    """Git hash of this program, followed by "+" if there are uncommitted changes. Outside a repository it is the hash
+    from which the program was installed, or "unknown".
     """
     here = Path(__file__).parent
     try:

@@ -21,11 +21,11 @@ from bench.provenance import software
 from bench.unfinished import replace
 
 SWITCH = "ROCKBENCH_RESULT_CACHE"
-"""Environment variable that switches the cache off with "off"."""
+"""Environment variable; the value "off" disables the cache."""
 
 FOLDER = "results"
 MOST = 4000
-"""Maximum number of entries; beyond it, the least recently used ones are removed."""
+"""Maximum number of entries; if it is exceeded, only the more recently used half of this number is kept."""
 
 PACKAGES = ("bench", "drivers", "protocols", "sim")
 

@@ -25,7 +25,7 @@ def open_rig(configuration: BenchConfiguration, *, realtime: bool) -> Rig:
     """Open the rig of the configured backend, unarmed and wrapped in the checks of `drivers.border`. The caller closes
     it.
 
-    Raises BackendFault if the backend returns no valid rig.
+    Raises BackendFault if the backend fails with an error other than this program's, or returns no valid rig.
     """
     backend = load_backend(configuration.backend)
     try:

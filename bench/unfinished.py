@@ -92,7 +92,7 @@ def write_new(path: Path, write: Callable[[Path], None], *, overwrite: bool = Fa
     """Write a file under a temporary name in the folder of `path`, and rename it when it is complete.
 
     Raises InvalidInput if `path` exists and `overwrite` is False, or if its folder does not exist, and RockbenchError
-    if the disk fails.
+    if the file cannot be written.
     """
     if path.exists() and not overwrite:
         raise InvalidInput("file", str(path), "the file exists and is never overwritten; choose another name")

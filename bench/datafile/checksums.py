@@ -159,8 +159,9 @@ class Integrity:
     """`compared` is the number of datasets that match their checksum. `failing` holds a message for each dataset or
     group that was changed, is missing or cannot be read, by path.
 
-    `unchecked` holds the paths of the other datasets: those without a checksum, as in a file that was not closed, and
-    those too large for the requested check.
+    `unchecked` holds the paths of the datasets whose values were not compared: those too large for the requested check,
+    those whose checksum is empty because the file was not closed and, in a file without checksums, all datasets.
+    Datasets added to a file with checksums are not included; see `added`.
     """
 
     compared: int
@@ -178,7 +179,7 @@ class Integrity:
 def integrity(entry: hdf5.Group, largest: int | None = SMALL, done: Done = lambda _done, _all: None) -> Integrity:
     """Compare all attributes, and all datasets of at most `largest` bytes (None for no limit), with their checksums.
 
-    `done` receives the number of datasets processed.
+    `done` receives the number of datasets processed and the total.
     """
     if not hdf5.has(entry, GROUP):
         lost: dict[str, str] = {}

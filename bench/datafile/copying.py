@@ -24,7 +24,7 @@ class Copying:
     """A copy of a file of `size` bytes: the first `counted` rows of each part, without the objects at the paths in
     `leave`.
 
-    `lost` receives the reason for each unreadable path; growing datasets are copied up to the last readable row.
+    `lost` receives the reason for each unreadable path; growing datasets are copied up to the first unreadable row.
     """
 
     counted: Mapping[str, int]
@@ -129,8 +129,8 @@ def renew_tables(
     entry: hdf5.Group, lost: Iterable[str], own: Iterable[str], lines: Iterable[Mapping[str, Any]]
 ) -> None:
     """Replace every table that has a dataset among the `lost` paths by an empty one; its rows may be recovered from the
-    `lines` of the journal. The columns of the tables of the protocol's `own` events are in these lines; without them
-    the table is removed.
+    `lines` of the journal. `own` are the paths of the tables of the protocol's events; such a table is removed if no
+    line declares its columns.
     """
     gone = tuple(lost)
     declared = {line["table"]: line["fields"] for line in lines if "table" in line and "fields" in line}

@@ -1,7 +1,4 @@
-"""Fields of a row, with their types in the file, units and missing values, and the tables that grow during the run.
-
-Rows are buffered in memory and written together.
-"""
+"""Fields of a row, with their types in the file, units and missing values."""
 
 import dataclasses
 import inspect
@@ -132,7 +129,7 @@ def fields_of(row_type: type[Any]) -> tuple[Field, ...]:
     """The fields of a group of parameters, or the columns of a dataclass (`sim.parameters.column`) other than its
     parts.
 
-    Raises InvalidInput for types other than number, switch and string.
+    Raises InvalidInput for types other than number, switch, string and array of numbers.
     """
     if issubclass(row_type, Parameters):
         declared = [

@@ -76,7 +76,7 @@ class File(Group, Protocol):
 
 
 class DataFileError(RockbenchError):
-    """Error: the file could not be written or read any further; complete data written earlier stay readable."""
+    """Error: the file could not be written or read; complete data written earlier stay readable."""
 
     error_code = "data_file"
 

@@ -130,8 +130,8 @@ class Verdict:
 
 
 def verify(path: Path, done: Done = lambda _done, _all: None) -> Verdict:
-    """Verify the complete file of a campaign or re-analysis, piece by piece in bounded memory. `done` receives the
-    number of datasets processed.
+    """Verify the whole file of a campaign or re-analysis, piece by piece in bounded memory. `done` receives the number
+    of datasets processed and the total.
 
     Raises InvalidInput for a file of another kind, and DataFileError for a file that cannot be opened.
     """

@@ -134,7 +134,7 @@ class DataFile(SampleReader):
         summary in one line.
 
         Reads the datasets of at most `largest` bytes, or all datasets if None. `done` receives the number of datasets
-        processed.
+        processed and the total.
         """
         return integrity(self._entry, largest, done)
 

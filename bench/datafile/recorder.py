@@ -148,8 +148,8 @@ class Recorder:
     def close(self, status: Status | str, summary: str = "") -> None:
         """Write pending data, status and end time, and close the file; closing again has no effect.
 
-        Raises InvalidInput for an unknown status, DataFileError if the end could not be written. An unresponsive disk
-        does not block the end of the program.
+        Raises InvalidInput for a status with which a campaign cannot end, DataFileError if the end could not be
+        written. An unresponsive disk does not block the end of the program.
         """
         ends = [str(end) for end in Status if end not in (Status.RUNNING, Status.INTERRUPTED)]
         if status not in ends:
