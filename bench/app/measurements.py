@@ -121,8 +121,8 @@ class Campaign:
 
     @property
     def status(self) -> str:
-        """Status: completed, stopped, aborted or failed; running while the file is being written, and also if its
-        writer was killed.
+        """Status: completed, stopped, aborted, halted or failed; running while the file is being written, and also if
+        its writer was killed; interrupted for a file recovered with losses or from a killed writer.
         """
         return self._file.status
 

@@ -107,7 +107,7 @@ class Modes:
     """Undamped modes; the last axis of the shapes is u1, u2, theta. The first axis of `omega` and `shapes` is dropped
     for a single stiffness.
 
-    omega : circular frequencies, shape (n_beta, 3); a negative entry is the growth rate of a divergent mode.
+    omega : circular frequencies, shape (n_beta, 3); a negative entry is minus the growth rate of a divergent mode.
     shapes : mode shapes, shape (n_beta, 3, 3).
     bare_omega, bare_shapes : those of the bare frame, of shapes (2,) and (2, 2).
     """

@@ -63,8 +63,8 @@ def disk_space(configuration: BenchConfiguration, duration: float, folder: Path)
 
 
 def bytes_per_second(configuration: BenchConfiguration) -> float:
-    """Data rate of all channels, the drive and the twin's estimates. Counts have 16 bits on the simulated bench, and up
-    to 32 bits otherwise.
+    """Data rate [B/s] of all channels, the drive, the twin's estimates and the raw values of serial lasers. Counts have
+    16 bits on the simulated bench, and up to 32 bits otherwise.
     """
     inputs = len(configuration.hardware.transducers) + 2 if configuration.backend == "hardware" else 4
     width = 2 if configuration.backend == "simulated" else 4

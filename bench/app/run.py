@@ -42,7 +42,7 @@ def run(
     parameters, more : parameters of the protocol, as a mapping and as keyword arguments.
     specimen : specimen file (.json).
     seed, realtime : seed of a simulated bench, and whether it runs in real instead of virtual time.
-    out : folder for the results, by default runs/<protocol>-<date>.
+    out : folder for the results, by default runs/<protocol>-<date>T<time>.
     operator : called with each request to the person at the bench; must return True once the task is done. Without it,
         a simulated bench confirms every request, and a run on a real bench is refused.
     progress : called with an activity and its completed fraction, 0 to 1.

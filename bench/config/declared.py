@@ -131,7 +131,7 @@ def keys(model: type[Parameters], prefix: str = "") -> Iterator[str]:
 
 
 def summary(model: type[Parameters]) -> str:
-    """The first sentence of a group's documentation."""
+    """The first line of a group's docstring."""
     return (getdoc(model) or "").split("\n", 1)[0]
 
 

@@ -230,6 +230,5 @@ def _plain(digits: str) -> float:
 def _converted(digits: str, typed: str, unit: str) -> float:
     if typed == unit:
         return _plain(digits)
-    # pint takes most of a second to load: import it only for a value in another unit
-
+    # only here, because pint takes most of a second to load
     return converted(digits, typed, unit)

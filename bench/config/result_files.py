@@ -39,7 +39,9 @@ class KeptFile:
             raise InvalidInput(self.item, str(path), f"the file cannot be written: {error.strerror}") from None
 
     def read(self, path: Path) -> dict[str, Any]:
-        """Contents of a file without its header. Raises InvalidInput if kind or version differ."""
+        """Contents of a file without its header. Raises InvalidInput if the file cannot be read, or if its format or
+        version differs.
+        """
         try:
             data: Any = json.loads(read_bounded(path).decode("utf-8-sig"))
             require_shallow(data)

@@ -22,9 +22,9 @@ _ESTIMATE = 2.0
 are treated as typing errors.
 """
 _LONGEST_WAIT, _LONGEST_DEBOUNCE, _WORST_CLOCK = 60.0, 1.0, 0.1
-"""Longest usual delays of the guard for a missing sensor or block and for an exceeded limit [s], given that the table
-at full velocity crosses its stroke in a quarter of a second; and a relative clock error greater than that of any quartz
-clock.
+"""Longest accepted delays of the guard for a missing sensor or block and for an exceeded limit [s], given that the
+table at full velocity crosses its stroke in a quarter of a second; and a relative clock error greater than that of any
+quartz clock.
 """
 _LEAST_ERROR = 1e-7
 """Smallest plausible linearity error of a triangulation laser [m]: the optoNCDT 1420 resolves 8 um."""

@@ -129,13 +129,13 @@ class Twin(Parameters):
     residual_warn: float | None = quantity(
         0.15,
         "1",
-        "relative rms of the measured drift outside the band above which a warning is issued; if absent, never",
+        "relative rms of the measured drift's excess over the band above which a warning is issued; if absent, never",
         gt=0,
     )
     residual_stop: float | None = quantity(
         None,
         "1",
-        "relative rms of the measured drift outside the band above which the run ends with a smooth "
+        "relative rms of the measured drift's excess over the band above which the run ends with a smooth "
         "ramp; if absent, never",
         gt=0,
         example=0.5,

@@ -15,7 +15,9 @@ from sim.parameters import Parameters
 
 
 def as_toml(configuration: BenchConfiguration) -> str:
-    """All keys with a value, except those of the simulation and hardware tables that the backend does not use."""
+    """All keys with a value. The table `simulation` is omitted for the hardware, both tables of the built-in backends
+    for a backend of another package.
+    """
     unused = {"rig": {"hardware", "simulation"}, "hardware": {"simulation"}}.get(configuration.table, set[str]())
     plain: dict[str, Any] = configuration.model_dump(mode="json", exclude_none=True, exclude=unused)
     return tomlkit.dumps(plain)

@@ -25,7 +25,9 @@ _NO_DECIMAL = re.compile(r"""^[ \t]*([\w.-]+)[ \t]*=[^"'#\n]*?(\b0[xob]\w+|\b\d+
 
 
 def read_table(path: Path, item: str) -> dict[str, Any]:
-    """The contents of a TOML file, unvalidated. `item` names the file in the one-line InvalidInput."""
+    """The contents of a TOML file, without validation of its keys. Raises InvalidInput, with `item` as the name of the
+    file, if it cannot be read or is not valid TOML.
+    """
     text = ""
     try:
         # Windows editors add a byte-order mark, which TOML does not allow

@@ -87,7 +87,9 @@ def notices_of(parameters: Parameters, specimen: Specimen) -> tuple[str, ...]:
 
 
 def scales_of(parameters: Parameters, specimen: Specimen) -> tuple[str, ...]:
-    """Notice of the requested circular frequencies in Hz and the natural frequencies of the bare frame."""
+    """Lines with the requested circular frequencies and the natural frequencies of the bare frame, in rad/s and Hz;
+    empty if no circular frequency was requested.
+    """
     lines = tuple(in_hertz(parameters))
     if not lines:
         return ()

@@ -49,7 +49,7 @@ class Campaign:
 
     @cached_property
     def integrity(self) -> Integrity:
-        """Checksums of every dataset; reads the whole file."""
+        """Result of the comparison of every dataset with its checksum; reads the whole file."""
         return self.record.integrity(None)
 
     @cached_property

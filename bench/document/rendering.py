@@ -33,7 +33,7 @@ that a section with one large figure fits on a page."""
 
 
 def html_page(document: Document) -> str:
-    """The complete HTML text, in UTF-8. Draws every figure."""
+    """The complete HTML text, which declares the encoding UTF-8. Draws every figure."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
     from markupsafe import Markup
 

@@ -93,8 +93,8 @@ class Requests:
         self.interrupted = False
         """Whether a signal caused the request: the session then exits as soon as the rig is at rest."""
         self.breaking: Callable[[], BaseException] | None = None
-        """Exception that a signal handler raises in the main thread after its request; None while the loop polls for
-        requests.
+        """Constructor of the exception that a signal handler raises in the main thread after its request; None while
+        the loop polls for requests.
         """
         self.rig_closed = False
         """Whether no rig is open, so that the process may exit at once."""

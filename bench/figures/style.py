@@ -49,7 +49,7 @@ def new_figure(width: float, height: float) -> "Figure":
 def write_figure(path: Path, figure: "Figure") -> None:
     """Saves in the format of the suffix: PNG at 200 dpi, PDF or SVG.
 
-    Raises InvalidInput if `path` exists and RockbenchError if the disk fails.
+    Raises InvalidInput if `path` exists and RockbenchError if it cannot be written.
     """
     write_new(
         path, lambda unfinished: figure.savefig(unfinished, dpi=DPI, format=path.suffix.lower().removeprefix("."))

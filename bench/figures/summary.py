@@ -67,7 +67,7 @@ class Summary:
 
 
 def write_summary(path: Path, summary: Summary) -> None:
-    """Writes the summary as JSON. Raises InvalidInput if `path` exists and RockbenchError if the disk fails."""
+    """Writes the summary as JSON. Raises InvalidInput if `path` exists and RockbenchError if it cannot be written."""
     text = json.dumps(summary.as_dict(), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
     def write(unfinished: Path) -> None:

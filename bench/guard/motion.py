@@ -60,7 +60,7 @@ class ChannelLimit:
 class MotionWatch:
     """Checks blocks of values against the limits. Channels are found by name; absent ones are not checked.
 
-    `further` are the limits of the signals with these columns. Raises InvalidInput for a limit that its channel cannot
+    `further` are the limits on the signals of further channels. Raises InvalidInput for a limit that its channel cannot
     measure.
     """
 

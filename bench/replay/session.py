@@ -103,7 +103,7 @@ class Replayed:
     a killed program, neither of which recorded data can reproduce. `in_place` lists violations that the samples do not
     contain and that abort requests replace. `played` of `rows` samples were requested. `same_wording` is False for a
     file with other message texts, and `same_intervals` for one with another evaluation of uncertainties; neither is
-    then compared. `returned` is the result of the plan, or None if the recording broke off.
+    then compared. `returned` is the result of the plan, or None if the plan did not end by itself.
     """
 
     status: str

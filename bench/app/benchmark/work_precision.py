@@ -36,7 +36,9 @@ Run = Callable[[], Outcome]
 
 @dataclass(frozen=True)
 class Method:
-    """A method at one setting. `prepare` compiles its functions; `weight` is the approximate duration of a run [s]."""
+    """A method at one setting. `prepare` compiles its functions and returns the function that is timed; `weight` is the
+    approximate duration of a run [s].
+    """
 
     name: str
     setting: str

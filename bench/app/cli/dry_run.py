@@ -127,8 +127,8 @@ def _text(found: "Preflight") -> str:
 
 
 def _margins(margins: "tuple[Margin, ...]") -> str:
-    """Table of margins, tightest first; the margins in the columns "at 95 %" are kept by 95 % of the specimens within
-    the uncertainty.
+    """Table of margins, tightest first. Of the specimens within the uncertainty, 95 % have at least the margins in the
+    column "at 95 %".
     """
 
     def number(value: float | None) -> str:

@@ -74,7 +74,7 @@ def check(file: Annotated[Path, Parameter(help="File to check.", metavar="FILE",
         return 2
     for notice in (*former_keys(file), *review(read_configuration(file)).notices):
         print_warning(notice)
-    print(f"{file} is good")
+    print(f"{file} is valid")
     return 0
 
 

@@ -73,7 +73,7 @@ class Subject:
     configuration: "BenchConfiguration"
     records: "tuple[Accelerogram, ...]" = ()
     unfinished: "Path | None" = None
-    """Folder for an unfinished result, from which it continues."""
+    """Folder for an unfinished result, from which the computation continues."""
 
 
 def _sine(
@@ -124,7 +124,7 @@ def _check_scheduler(request: Parameters) -> None:
 
 
 def _unfinished(options: ResultOptions) -> "Path | None":
-    """Folder for an unfinished result, beside the first file of the result; None without files."""
+    """Folder for an unfinished result, in the folder of its first file; None without files."""
     path = options.out or options.csv
     return None if path is None else path.with_name(f".{path.name}.unfinished")
 

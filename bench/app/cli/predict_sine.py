@@ -249,7 +249,9 @@ def _history_figure(found: Sequence[History]) -> "Figure":
 
 
 def extremes(table: "Table") -> str:
-    """Least and greatest alpha_2 of each branch at each stiffness; for a map, of each branch over the whole map."""
+    """Least and greatest alpha_2 of each branch: at each stiffness, or over all if there are more than `MOST_SPECTRA`
+    stiffnesses.
+    """
     omega, beta, branch, alpha, stable = (
         table[name].values for name in ("omega_rad_s", "beta", "layer", "alpha_2", "stable")
     )

@@ -152,7 +152,7 @@ def _figure(fits: "StrokeFits") -> "Figure":
 
 def _write_record(path: Path, fits: "StrokeFits") -> None:
     """Write the chosen fit in full precision as columns that `bench.accelerograms.columns` reads. Raises InvalidInput
-    if `path` exists and RockbenchError if the disk fails.
+    if `path` exists and RockbenchError if it cannot be written.
     """
     import numpy as np
 

@@ -75,8 +75,7 @@ def gui(
     """Open the operator's window.
 
     Runs are separate processes. When the window closes, they ramp the output to zero, unless they were set to continue
-    without it. STOP in the window is a request
-    to the software; the emergency stop is the red button at the bench.
+    without it. STOP in the window is a request to the software; the emergency stop is the red button at the bench.
     """
     require("gui", "rockbench gui")
     progress("opening the window")

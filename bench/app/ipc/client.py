@@ -211,7 +211,9 @@ class SessionClient(ClientConnection):
                 self._converse(connection)
 
     def _wait(self, key: bytes) -> None:
-        """Report a process that ends without a final message, and wake the receiving thread if it never connected."""
+        """Report a process that ends without a final message; if the process never connected, wake the receiving
+        thread.
+        """
         code = self.process.wait()
         with suppress(OSError, EOFError):
             Client(self._address, authkey=key).close()

@@ -128,8 +128,8 @@ class Attached:
 
 @dataclass(frozen=True)
 class Control:
-    """Whether an attached client may answer questions and ramp out, because the owner's window is lost. Any client may
-    stop the run.
+    """Whether an attached client may answer questions and request the smooth ramp, because the owner's window is lost.
+    Every client that is not read-only may abort or halt the run.
     """
 
     granted: bool

@@ -98,7 +98,7 @@ class SessionServer:
     pending : called in a receiving thread; returns whether the main thread is not polling for requests at present and
         must therefore be interrupted.
 
-    Clients that `attach` may stop the run, and may answer questions while the owner is lost.
+    Clients that `attach` may abort or halt the run and, while the owner is lost, stop it and answer questions.
     """
 
     def __init__(
@@ -210,7 +210,7 @@ class SessionServer:
                         self._attending.discard(queue)
                         continue
                     self._attending.add(queue)
-                    # while the owner is present, no other client controls the run, but every client may stop it
+                    # while the owner is present, no other client controls the run, but every one may abort or halt it
                     stops = isinstance(message, Ask) and message.end in ("abort", "halt")
                     if not self.connected or isinstance(message, Note) or stops:
                         self._handle(message)

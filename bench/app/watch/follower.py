@@ -31,7 +31,7 @@ LOG_LINES = 100
 
 
 class RunRecord:
-    """What has been received of one run, or the empty contents before the first run."""
+    """Contents of the page for one run, from the messages received so far; empty before the first run."""
 
     def __init__(self, session: RunningSession | None = None) -> None:
         self.state = SessionState(session)

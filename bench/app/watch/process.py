@@ -1,7 +1,7 @@
 """The process of the live page of one run: `python -m bench.app.watch.process`, started by `rockbench run --watch`.
 
-It reads its assignment from standard input, one line of JSON, writes the address of the page or the reason of a refusal
-to standard output, and ends when its input is closed.
+It reads its assignment from standard input, one line of JSON, writes the address of the page or the reason for a
+refusal to standard output, and ends when its input is closed.
 """
 
 import json
@@ -18,7 +18,7 @@ def main() -> None:
     """Serve the page until standard input is closed."""
     ignore_requests()
     if sys.platform != "win32":
-        # the run comes first
+        # the run has priority
         os.nice(5)
     assignment = json.loads(sys.stdin.readline())
     try:

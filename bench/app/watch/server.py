@@ -1,4 +1,4 @@
-"""The server of the page: four fixed files, the document, and its changes as server-sent events. It only reads."""
+"""The read-only server of the page: four fixed files, the document, and its changes as server-sent events."""
 
 import hmac
 import sys
@@ -151,7 +151,7 @@ class Handler(BaseHTTPRequestHandler):
         if token:
             given, _, path = path.partition("/")
         elif self.headers.get("Host", "").rsplit(":", 1)[0] not in self.server.hosts:
-            # a page of another site must not read this one by a name of its own for this computer
+            # a page of another site must not read this one through a host name that resolves to this computer
             self._answer(HTTPStatus.FORBIDDEN, "text/plain", b"open the address that rockbench printed\n")
             return None
         if not hmac.compare_digest(given.encode(), token.encode()):

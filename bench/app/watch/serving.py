@@ -1,4 +1,4 @@
-"""Serves the page of the sessions on this computer until it is told to end."""
+"""The live page as a service: follows the sessions on this computer and publishes their state to browsers."""
 
 import secrets
 import threading
@@ -40,7 +40,7 @@ class LivePage:
         try:
             while not waiting.wait(over, PERIOD):
                 self._update()
-            # the end of the run may have been sent with the end of this process
+            # the last message of the run may arrive together with the request to end
             waiting.wait(threading.Event(), PERIOD)
             self._update()
             waiting.wait(threading.Event(), LAST if self._feed.has_readers else 0.0)

@@ -104,7 +104,7 @@ function drawTraces(holder, found) {
   });
 }
 
-/** About `count` round values between two values; on a logarithmic axis over a decade 1, 2 and 5 times powers of ten. */
+/** About `count` round values between two values; on a logarithmic axis with a ratio above 5, 1, 2 and 5 times powers of ten. */
 function ticks(low, high, log, count) {
   const found = [];
   if (log && high / low > 5) {

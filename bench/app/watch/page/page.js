@@ -131,7 +131,7 @@ function receive(message) {
   if (!document.hidden) show(changed);
 }
 
-/** Without messages, nothing on the page is live: it says so, and for how long. */
+/** Marks the page as not live, with the duration of the silence, if no message arrives. */
 function check() {
   const silence = performance.now() - heard;
   if (silence < PATIENCE) return;
