@@ -103,6 +103,6 @@ class TwinEstimate(Event):
         "1", "rms of measured minus modelled drift over 1 s, relative to the largest rms of the measured drift"
     )
     excess: float = column(
-        "1", "rms of the measured drift's excess over the band over 1 s, relative to the largest rms of that drift"
+        "1", "rms distance of the measured drift from the band over 1 s, relative to the largest rms of that drift"
     )
     trace: Array

@@ -25,7 +25,7 @@ SWITCH = "ROCKBENCH_RESULT_CACHE"
 
 FOLDER = "results"
 MOST = 4000
-"""Maximum number of entries; if it is exceeded, only the more recently used half of this number is kept."""
+"""Maximum number of entries; beyond it, the least recently used ones are removed until half of this number is left."""
 
 PACKAGES = ("bench", "drivers", "protocols", "sim")
 

@@ -48,7 +48,7 @@ _EQUAL = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class _Table:
-    """`values` has shape (rows, columns); `first` is the line number of its first row."""
+    """`values` has shape (rows, columns); `first` is the index of the line of its first row."""
 
     values: Array
     headings: list[str]

@@ -35,7 +35,7 @@ def number_in(text: RecordText, index: int, stated: str, item: str) -> float:
 
 
 def count_in(text: RecordText, index: int, stated: str, item: str = "the number of samples") -> int:
-    """An integer above 1 stated in header line `index`."""
+    """An integer above 1 stated in header line `index`. Raises InvalidInput."""
     word = stated.strip()
     if re.fullmatch(r"\d+", word) is None or int(word) < 2:
         raise text.refusal(index, f"{item} must be an integer of at least 2; the header is damaged")

@@ -162,7 +162,7 @@ class Preflight:
         return kept
 
     def require(self) -> None:
-        """Raise InvalidInput, naming the binding limit, if the run is refused."""
+        """Raise InvalidInput with the reason if the run is refused."""
         if (refused := self.refusal) is not None:
             raise refused
 

@@ -120,7 +120,7 @@ class BenchConfiguration(Parameters):
 
     @property
     def seed(self) -> int | None:
-        """Random seed of the bench; None for a real bench."""
+        """Random seed of the simulated bench; None for any other backend."""
         return self.simulation.seed if self.backend == "simulated" else None
 
     @property
@@ -162,7 +162,7 @@ class BenchConfiguration(Parameters):
 
     @property
     def simulated_shaker(self) -> Shaker | None:
-        """The shaker of the simulated bench; None with hardware, whose amplifier and friction are not known."""
+        """The shaker of the simulated bench; None for any other backend, whose amplifier and friction are not known."""
         return self.simulation.bench.shaker if self.backend == "simulated" else None
 
     @property

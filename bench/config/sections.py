@@ -129,7 +129,8 @@ class Twin(Parameters):
     residual_warn: float | None = quantity(
         0.15,
         "1",
-        "relative rms of the measured drift's excess over the band above which a warning is issued; if absent, never",
+        "limit of the relative rms distance of the measured drift from the band, above which a warning is issued; "
+        "if absent, never",
         gt=0,
     )
     residual_stop: float | None = quantity(

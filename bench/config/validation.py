@@ -31,7 +31,7 @@ def validated(model: type[P], data: Mapping[str, Any], named: Callable[[Path], s
     """An instance of `model` from plain data, such as that of a file; `named` formats the location of a value for the
     user.
 
-    Raises InvalidInput for the first invalid value, with the number of further ones.
+    Raises InvalidInput for the first invalid value, with the names of the others.
     """
     try:
         return _parsed(model, data)

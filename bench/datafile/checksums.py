@@ -172,7 +172,7 @@ class Integrity:
         """One-line summary."""
         if self.failing:
             return "damaged or changed since it was written: " + "; ".join(self.failing.values())
-        left = f"; {len(self.unchecked)} were not checked" if self.unchecked else ""
+        left = f"; {len(self.unchecked)} not checked" if self.unchecked else ""
         return f"{self.compared} datasets are unchanged{left}"
 
 

@@ -24,7 +24,7 @@ ROWS_PER_PACKED_CHUNK = 4096
 
 
 class Kind(StrEnum):
-    """Kinds of a field."""
+    """Kind of a field's values."""
 
     REAL = "real"
     WHOLE = "whole"

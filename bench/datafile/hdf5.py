@@ -58,7 +58,7 @@ def reopen_to_write(file: File) -> File:
 def release(file: File) -> None:
     """Close a file that can no longer be written, keeping the flushed data on the disk.
 
-    HDF5 tries to write its pending data. If that fails, it frees half of its state and later crashes the process, at
+    HDF5 tries to write its pending data. If that fails, it frees part of its state and later crashes the process, at
     the latest on exit, which is unacceptable in a program that drives a shaker. The remaining writes are therefore
     redirected to the null device.
     """

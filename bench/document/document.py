@@ -73,7 +73,7 @@ class Section:
 
 @dataclass(frozen=True, eq=False)
 class Document:
-    """A complete report. `summary` follows the title; `provenance` is the line below it: date, program, definitions."""
+    """A complete report. `provenance` is the line below the title: date, program, definitions; `summary` follows it."""
 
     title: str
     summary: Sequence[Part]

@@ -61,8 +61,8 @@ def gain_figure(points: Sequence[PointLike], prediction: Mapping[str, NDArray[An
     """alpha_2 against beta, one panel per record.
 
     `points` have the fields of an earthquake point; `prediction` has record, beta and alpha_2 under the requested
-    motion (NaN where the block topples). Intervals contain 95 % of the expected measurements; a cross at the upper edge
-    marks a toppled block.
+    motion (NaN where the block topples, marked by a short stroke). Intervals contain 95 % of the expected measurements;
+    a cross at the upper edge marks a point without a gain, with its status.
     """
     rows = plain(points)
     names = list(dict.fromkeys([str(name) for name in prediction["record"]] + [str(row["record"]) for row in rows]))

@@ -29,10 +29,11 @@ class Exchange:
 
     `values` are the block's channel values in their units, shape (n, n_channels), `signals` the signals of the
     experiment, shape (n, n_signals; 0 without a signal map), and `drive` [V], shape (n,), the samples played meanwhile.
-    `violation` is the first limit exceeded, if any, and `runaway` the first that concerns the table itself. `warnings`
-    are the limits whose warning level was reached for the first time since arming. `opened` names the open safety
-    inputs; if there are any, the enable line has been cut. `magnitudes` returns the largest magnitude of each watched
-    quantity in the block, by key, for display.
+    `violation` is the exceeded limit, if any: one that cuts the enable line before that of a refused command, and this
+    before any other, of which the earliest is stated. `runaway` is the first exceeded limit that concerns the table
+    itself. `warnings` are the limits whose warning level was reached for the first time since arming. `opened` names
+    the open safety inputs; if there are any, the enable line has been cut. `magnitudes` returns the largest magnitude
+    of each watched quantity in the block, by key, for display.
     """
 
     block: Block

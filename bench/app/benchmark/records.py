@@ -37,8 +37,8 @@ MAP_COLUMNS = (
 
 
 def gain_maps(n: int, runs: int, repetitions: int) -> Section:
-    """Time the map of `n` x `n` points, and runs of 120 s at `runs` x `runs` of these points; the time of the runs is
-    scaled to all points.
+    """Time the map of `n` x `n` points, and runs of 120 s at `runs` x `runs` of these points, and compare the times per
+    point.
     """
     betas, omegas = np.linspace(*BETAS, n), np.linspace(*OMEGAS, n)
     specimen = Specimen()

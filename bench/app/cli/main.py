@@ -132,7 +132,7 @@ COMMANDS = {
     ),
     "file verify": (
         "file:verify",
-        "Read a complete data file and compare every dataset with its checksum and the layout.",
+        "Compare every dataset of a data file with its checksum and with the layout.",
         "campaign.h5 --json",
     ),
     "file recover": (

@@ -159,7 +159,7 @@ class PhaseBar:
 
 
 class _GivesWay:
-    """A stream that calls `hide` before its first text."""
+    """A stream that calls `hide` before each text."""
 
     def __init__(self, stream: TextIO, hide: Callable[[], None]) -> None:
         self._stream, self._hide = stream, hide

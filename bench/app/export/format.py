@@ -126,7 +126,7 @@ def _raw_signal(record: DataFile, channel: Channel) -> Signal:
 
 
 def _tables(record: DataFile) -> Iterator[tuple[str, list[TableColumn]]]:
-    """The results, the recorded events, and the tables stored before the run."""
+    """The results, the recorded events, findings and fits, and the tables stored before the run."""
     points, about = record.points, record.results
     if points:
         yield "points", [_column(name, about[name].unit, about[name].description, points) for name in points[0]]

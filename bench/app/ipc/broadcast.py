@@ -61,7 +61,8 @@ EVENTS, TRACES = 5000, 64
 
 class SendQueue:
     """Queue between the engine's thread, which never waits, and the sending thread. When full, it discards the oldest
-    traces and twin estimates and the newest other events, and counts the losses. The data file is complete regardless.
+    traces and twin estimates and the newest other events, and counts the losses of traces and other events. The data
+    file is complete regardless.
     """
 
     def __init__(self, events: int = EVENTS, traces: int = TRACES, first: Iterable[FromSession] = ()) -> None:

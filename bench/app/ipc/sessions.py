@@ -26,7 +26,7 @@ class RunningSession:
     process : identifier of the process.
     address, key : address and key of the session's listener.
     owner : "window" or "terminal".
-    real : True for a bench with hardware.
+    real : True for the backend "hardware".
     began : time of the start [s since 1970].
     """
 

@@ -15,7 +15,7 @@ from bench.document.typography import (
 )
 
 MOST_LISTED = 40
-"""Maximum number of listed warnings; further ones are only counted."""
+"""Maximum numbers of listed damaged datasets and of listed warnings; further warnings are only counted."""
 
 GRAVE = ("Warned", "LimitExceeded")
 ENDINGS = ("-> aborting", "-> halted")
