@@ -55,7 +55,7 @@ class QueueFile:
         return tuple(test.model_copy(update=left) if test.stage is Stage.RUNNING else test for test in tests)
 
     def write(self, tests: Sequence[Queued]) -> None:
-        """Replace the file atomically. Raises InvalidInput if it cannot be written or another program has changed it."""
+        """Replace the file atomically. Raises InvalidInput if this fails or another program has changed the file."""
         if self._text() != self._known:
             allowed = (
                 "another program has changed the file: open it again, in the window or on the command line but not "
