@@ -136,8 +136,8 @@ class Twin(Parameters):
     residual_stop: float | None = quantity(
         None,
         "1",
-        "relative rms of the measured drift's excess over the band above which the run ends with a smooth "
-        "ramp; if absent, never",
+        "limit of the relative rms distance of the measured drift from the band, above which the run ends with a "
+        "smooth ramp; if absent, never",
         gt=0,
         example=0.5,
     )

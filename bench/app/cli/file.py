@@ -138,7 +138,7 @@ def export(
 
     Writes one file per run; names and units are kept, and missing samples are NaN. Every dataset is compared with its
     checksum; damaged ones are reported and listed in the file DAMAGED.txt of the folder. The exit code is 0 if
-    everything was written, 1 if the disk failed, 2 if an input was refused; no partial files remain.
+    everything was written, 1 if the disk failed, 2 if an input was refused, 130 after Ctrl-C; no partial files remain.
     """
     progress("loading the program")
     from bench.app.export.format import export as write

@@ -56,7 +56,7 @@ class Reduction:
 
 
 EVENTS, TRACES = 5000, 64
-"""Capacity of a queue in messages, and in blocks of traces (0.1 s each)."""
+"""Capacity of a queue in messages, and in blocks of traces (0.1 s each by default)."""
 
 
 class SendQueue:
