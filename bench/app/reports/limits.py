@@ -32,6 +32,8 @@ def limits_section(campaign: Campaign) -> Section:
             "Datasets that were damaged or changed since the file was written:",
             Listing(list(damaged.values())[:MOST_LISTED]),
         ]
+        if len(damaged) > MOST_LISTED:
+            parts.append(f"The file contains {len(damaged) - MOST_LISTED} more damaged datasets.")
     if record.status not in ("completed",):
         parts.append(Notice(f"The campaign was not completed: {record.status}. {typeset(record.summary)}".strip()))
     warnings = list(_warnings(campaign))

@@ -1,5 +1,6 @@
 """The live page as a service: follows the sessions on this computer and publishes their state to browsers."""
 
+import os
 import secrets
 import threading
 
@@ -28,8 +29,11 @@ class LivePage:
 
     def __init__(self, address: str, port: int, *, with_token: bool = True, process: int | None = None) -> None:
         if sessions_folder() is None:
-            why = "the live page needs the announcements of the sessions: unset the variable, or name a private folder"
-            raise InvalidInput(FOLDER, "off", why)
+            why = (
+                "the live page needs the announcements of the sessions, in a folder that only this user can read: unset "
+                "the variable, or name such a folder"
+            )
+            raise InvalidInput(FOLDER, os.environ.get(FOLDER, "not set"), why)
         self._feed, self._follower = Feed(), SessionFollower(process)
         self._server = PageServer(address, port, secrets.token_urlsafe(16) if with_token else "", self._feed)
         self.url = self._server.url

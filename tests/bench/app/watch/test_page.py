@@ -2,6 +2,7 @@
 
 import json
 import socket
+import sys
 from collections.abc import Callable, Generator
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, replace
@@ -148,6 +149,15 @@ def test_a_port_in_use_and_sessions_that_are_not_announced_are_refused(
     monkeypatch.setenv("ROCKBENCH_SESSIONS", "off")
     with pytest.raises(InvalidInput, match="ROCKBENCH_SESSIONS"):
         LivePage("127.0.0.1", 0)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="on Windows, permissions are not those of POSIX")
+def test_a_folder_that_others_may_read_is_named_in_the_refusal(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    tmp_path.chmod(0o755)
+    monkeypatch.setenv("ROCKBENCH_SESSIONS", str(tmp_path))
+    with pytest.raises(InvalidInput, match="that only this user can read") as caught:
+        LivePage("127.0.0.1", 0)
+    assert caught.value.value == str(tmp_path)
 
 
 def test_more_connections_than_are_served_are_closed(sessions: Path, monkeypatch: pytest.MonkeyPatch) -> None:  # noqa: ARG001
