@@ -157,7 +157,8 @@ def _step(text: RecordText, table: _Table) -> float:
     usual = float(np.median(steps))
     ends = (table.first, table.first + 1, table.first + steps.size)
     digit = max(place(text.lines[k].split(table.separator)[0].strip()) for k in ends)
-    # two rounded times may each be off by half a digit; more than half a step could hide a gap
+    # two rounded times may each be off by half a unit of the last digit; a tolerance of more than half a step could
+    # hide a gap
     rounding = digit * (1.0 + _EQUAL) if digit <= 0.5 * usual else _EQUAL * usual
     dt = float(time[-1] - time[0]) / steps.size
     wrong = np.flatnonzero(np.abs(steps - usual) > rounding)

@@ -31,7 +31,7 @@ EVIDENCE = 20.0
 """Decrease of the Bayesian information criterion above which the fit with a second pair is used."""
 
 SIGNIFICANT = 3.0
-"""Smallest norm of a pair's part of the series, relative to that expected of noise alone."""
+"""Smallest norm of the contribution of a significant pair to the series, relative to that expected from noise alone."""
 
 SHARE = 0.2
 """Smallest part of a second pair in the series, relative to that of the larger one, for which it may be the dominant

@@ -275,7 +275,7 @@ def _curves(configuration: BenchConfiguration) -> Iterator[str]:
             largest = max(abs(each) for each in curve.error)
             if largest < _LEAST_ERROR:
                 item = f"calibrated.laser_{number}.error"
-                yield f"{item}: its largest coefficient, {largest:g} m, is below {_LEAST_ERROR:g} m"
+                yield f"{item}: its largest coefficient, {largest:g} m, is implausibly small (below {_LEAST_ERROR:g} m)"
 
 
 def _assumed(specimen: Specimen, name: str) -> float | None:

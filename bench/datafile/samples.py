@@ -148,7 +148,7 @@ class Samples:
 
 
 def chunk_of(sample_rate: float, duration: float = CHUNK_TIME) -> int:
-    """Number of rows in a chunk of the samples of `duration` [s]."""
+    """Number of rows in a chunk that holds `duration` [s] of samples."""
     return max(1, round(duration * sample_rate))
 
 

@@ -34,7 +34,7 @@ from sim.errors import InvalidInput
 
 
 def journal_path(path: Path) -> Path:
-    """Path of a file's journal."""
+    """The journal of the data file `path`: the same name, ending in .events.jsonl."""
     return path.with_suffix(".events.jsonl")
 
 
@@ -87,7 +87,7 @@ ROOM = 1_000_000
 
 
 def _check_folder(folder: Path) -> None:
-    """Raise OSError unless a file of some size can be created in `folder`.
+    """Raise OSError unless a file of `ROOM` bytes can be created in `folder`.
 
     HDF5 does not report the cause of a failure clearly, and crashes the process if the disk becomes full during
     creation.

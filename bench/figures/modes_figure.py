@@ -62,7 +62,7 @@ def draw_shape(panel: "Axes", specimen: Specimen, shape: Shape) -> None:
 
 
 def _draw_frame(panel: "Axes", specimen: Specimen, u1: float, u2: float, colour: str, width: float) -> None:
-    """Draws the frame with columns bent as in a shear frame, clamped at both floors."""
+    """Draws the frame with columns bent as in a shear frame, without rotation at the base and at the storeys."""
     frame = specimen.frame
     x = np.linspace(0.0, 1.0, 25)
     rise = x * x * (3.0 - 2.0 * x)

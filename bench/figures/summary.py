@@ -81,7 +81,7 @@ def json_ready(value: Any) -> Any:
     if isinstance(value, Enum):
         return json_ready(value.value)
     if isinstance(value, float):
-        # a NumPy scalar is a float, but its repr contains its type
+        # numpy.float64 is a subclass of float
         return float(value) if math.isfinite(value) else None
     if isinstance(value, dict):
         return {str(key): json_ready(item) for key, item in cast(dict[Any, Any], value).items()}

@@ -46,7 +46,7 @@ class Marker:
         """End the pulses; the output is low."""
         task, self._task = self._task, None
         if task is not None:
-            with translated("clearing the task of the pulses"):
+            with translated("clearing the pulse task"):
                 task.close()
 
 

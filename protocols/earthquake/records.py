@@ -39,7 +39,7 @@ _TEXTS = {
     "source": "file of the record, or its synthetic source",
     "format": "format of the file",
     "unit": "unit in the file",
-    "sha256": "SHA-256 of the file, or of the samples without a file",
+    "sha256": "SHA-256 of the file, or of the samples if there is no file",
 }
 
 

@@ -139,7 +139,7 @@ def _passes(parameters: LaserCalibrationParameters) -> Generator[Step, Outcome, 
 
 
 def _progress(parameters: LaserCalibrationParameters, finished: int, activity: str) -> Progress:
-    """Progress, from the remaining duration of the plan, including the drive calibration before the first pass."""
+    """Progress after `finished` passes, from the remaining duration of the plan."""
     left = _measuring(parameters, finished)
     return Progress(1.0 - left / expected_duration(parameters), left, activity)
 

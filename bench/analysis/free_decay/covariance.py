@@ -152,7 +152,7 @@ def _parts(fit: Fit, errors: Errors) -> dict[str, Array]:
 
 
 def _spread(moved: Array) -> Array:
-    """Covariance due to independent `moved` shifts of the values, shape (m, count)."""
+    """Covariance of the values due to the independent shifts `moved`, shape (m, count)."""
     return moved.T @ moved
 
 

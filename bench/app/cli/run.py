@@ -83,7 +83,9 @@ def _run(
     if not options.watch and page != PageOptions():
         raise InvalidInput("--watch", None, "--address, --port and --no-token need the live page: add --watch")
     if options.watch and (options.dry_run or options.queue is not None):
-        raise InvalidInput("--watch", True, "there is no run to show: omit it, --dry-run or --queue")
+        raise InvalidInput(
+            "--watch", True, "--dry-run and --queue start no run to show; omit --watch, or omit --dry-run and --queue"
+        )
     from bench.app.cli.inputs import configuration_from, parameters_from, with_profile
     from bench.app.cli.terminal import choose
     from bench.app.folders import check_folder, default_folder, make_folder, remove_unused, result_names

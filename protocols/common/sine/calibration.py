@@ -25,7 +25,8 @@ FALLEN_REQUEST = "The block has fallen: set it upright again."
 def bare_calibration(
     parameters: SineParameters, omegas: Sequence[float], amplitude: float, bare: Specimen
 ) -> Generator[Step, Outcome, DriveCalibration]:
-    """Calibrate the drive of the `bare` frame at `omegas` [rad/s] and above, for tests at `amplitude` [m/s2].
+    """Calibrate the drive of the `bare` frame at `omegas` [rad/s], and from the highest of them up to its harmonic
+    `parameters.harmonics`, for tests at `amplitude` [m/s2].
 
     The table remains armed with this calibration.
     """

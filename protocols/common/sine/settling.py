@@ -34,7 +34,7 @@ settled.
 @dataclass(frozen=True)
 class TableState:
     """Sine of the table at the end of a dwell: its `turn` (see `Sine.turn`), the `shares` of its drive, and `answer`,
-    the response of its fundamental per share.
+    the ratio of the achieved share of the fundamental to the share in the drive.
     """
 
     turn: complex
