@@ -30,8 +30,8 @@ class LivePage:
     def __init__(self, address: str, port: int, *, with_token: bool = True, process: int | None = None) -> None:
         if sessions_folder() is None:
             why = (
-                "the live page needs the announcements of the sessions, in a folder that only this user can read: unset "
-                "the variable, or name such a folder"
+                "the live page needs the announcements of the sessions, in a folder that only this user can read: "
+                "unset the variable, or name such a folder"
             )
             raise InvalidInput(FOLDER, os.environ.get(FOLDER, "not set"), why)
         self._feed, self._follower = Feed(), SessionFollower(process)
