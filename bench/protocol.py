@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from bench.document.document import Section
     from bench.engine.steps import Outcome, Step
     from bench.events import Event
+    from bench.live_view import Live
     from bench.preflight.margins import Forecast
 
 P = TypeVar("P", bound=Parameters)
@@ -192,12 +193,15 @@ class RunView:
     """Display of a run. `headline` is the field of a point whose value, prediction and verdict are shown largest, by
     default the first field with an uncertainty. `labels` are the printed names of fields of a point, such as
     "restitution rₑₓₚ"; a field without a label is shown with the first words of its description. `matrix` has the axes
-    of the rows and the columns in which the points are arranged, if the values on them are known before the run.
+    of the rows and the columns in which the points are arranged, if the values on them are known before the run. `live`
+    returns the live view of the window, as a function of a `bench.live_view.LiveRun`; without it,
+    `bench.live_view.standard_view` does.
     """
 
     headline: str = ""
     labels: Mapping[str, str] = field(default_factory=dict[str, str])
     matrix: tuple[Axis, Axis] | None = None
+    live: "Live | None" = None
 
 
 @dataclass(frozen=True)

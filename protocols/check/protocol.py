@@ -95,5 +95,5 @@ PROTOCOL = Protocol(
     prepare=deferred("protocols.check.experiment:LoopCheck"),
     figures=("margins.png",),
     log_line=log_line,
-    view=RunView(headline="measured"),
+    view=RunView(headline="measured", live=deferred("protocols.check.live:check_view")),
 )

@@ -20,6 +20,9 @@ from sim.parameters import column
 
 Array = NDArray[np.float64]
 
+STEP = 0.01
+"""Time step of a `TableMotion` [s]."""
+
 REST = 2.0
 """Time at rest before each pass, in which the signals are zeroed [s]."""
 
@@ -45,6 +48,31 @@ class PassFinished(Event):
     @property
     def line(self) -> str:
         return f"{self.motion}: {self.text}"
+
+
+@event(journalled=False, eq=False)
+class TableMotion(Event):
+    """Accelerations of the table, `achieved` in one `play` of a drive and `target` [m/s2], shape (n,), at the `seconds`
+    since the start of the drive. For the live view only, since the file has every sample.
+    """
+
+    motion: str
+    play: str
+    seconds: Array
+    target: Array
+    achieved: Array
+
+    @property
+    def line(self) -> str:
+        return f"{self.motion}: {self.play}"
+
+
+def table_motion(motion: str, play: str, target: Target, acceleration: Array) -> TableMotion:
+    """The motion of one play, every `STEP` seconds; `acceleration` may extend beyond the target."""
+    every = max(round(STEP * target.sample_rate), 1)
+    wanted = target.acceleration[::every]
+    seconds = every / target.sample_rate * np.arange(wanted.size, dtype=np.float64)
+    return TableMotion(motion, play, seconds, wanted, acceleration[: target.acceleration.size : every])
 
 
 Ending = Status | Literal["samples lost"]
@@ -107,6 +135,7 @@ def replicate(
         report = replication.learn(moved[:, 0], moved[:, 1])
         if report.accepted:
             achieved = moved[:, 0]
+        yield Publish(table_motion(name, f"pass {report.number}", target, moved[:, 0]))
         yield Publish(_finished(name, report))
         if progress is not None:
             yield Publish(progress())

@@ -94,5 +94,6 @@ PROTOCOL = Protocol(
             "omega1_rad_s": "frequency ω₁",
             "omega2_rad_s": "frequency ω₂",
         },
+        live=deferred("protocols.coupling_stiffness.live:springs_view"),
     ),
 )

@@ -16,7 +16,7 @@ from math import tau
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.analysis.signals import DRIFT
+from bench.analysis.signals import ACCELERATION, DRIFT
 from bench.config.model import BenchConfiguration
 from bench.control.replication import ReplicationParameters
 from bench.control.table_model import TableModel
@@ -25,7 +25,7 @@ from bench.events import Event, PointFinished, Progress, StepStarted, Warned
 from bench.protocol import each_step
 from drivers.rig import OperatorTask, RigError
 from protocols.common.identification.plan import identified
-from protocols.common.replicate import replicate
+from protocols.common.replicate import replicate, table_motion
 from protocols.earthquake.measurement import GainMonitor, Histories, History, observe, tracking
 from protocols.earthquake.points import (
     BareTest,
@@ -213,6 +213,8 @@ class EarthquakePlan:
         seed = SEED + self._points
         if isinstance(outcome, Played):
             rate = shaking.target.sample_rate
+            play = f"beta = {specimen.label:g}"
+            yield Publish(table_motion(shaking.name, play, shaking.target, outcome.signals[:, ACCELERATION]))
             try:
                 observed = observe(outcome.signals, shaking.target.rest, rate)
             except InvalidInput as lost:

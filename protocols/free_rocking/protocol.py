@@ -116,5 +116,6 @@ PROTOCOL = Protocol(
             "p_rad_s": "frequency parameter p, from the motion",
             "p_sides_rad_s": "frequency parameter p, from the sides",
         },
+        live=deferred("protocols.free_rocking.live:rocking_view"),
     ),
 )

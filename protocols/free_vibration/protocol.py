@@ -55,5 +55,6 @@ PROTOCOL = Protocol(
             "omega1_rad_s": "frequency ω₁",
             "omega2_rad_s": "frequency ω₂",
         },
+        live=deferred("protocols.common.decays.live:decay_view"),
     ),
 )

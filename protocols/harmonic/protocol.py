@@ -214,5 +214,6 @@ PROTOCOL = Protocol(
         headline="alpha_2",
         labels={"alpha_2": "α₂", "alpha_2_orbit": "α₂ of the orbit", "multiplier": "multiplier"},
         matrix=(Axis("beta", "beta", "β {:g}"), Axis("omega", "omega_rad_s", "{:g} rad/s")),
+        live=deferred("protocols.harmonic.live:gain_view"),
     ),
 )

@@ -42,5 +42,6 @@ PROTOCOL = Protocol(
     view=RunView(
         headline="gain_m_s2_v",
         labels={"frequency_hz": "frequency", "gain_m_s2_v": "acceleration per drive", "noise_m_s2_hz": "noise"},
+        live=deferred("protocols.identify.live:response_view"),
     ),
 )

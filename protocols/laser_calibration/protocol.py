@@ -68,5 +68,9 @@ PROTOCOL = Protocol(
     prepare=deferred("protocols.laser_calibration.experiment:LaserCalibrationRun"),
     figures=("laser_errors.png",),
     files=("laser_calibration.json",),
-    view=RunView(headline="scale", labels={"scale": "scale", "delay_s": "delay"}),
+    view=RunView(
+        headline="scale",
+        labels={"scale": "scale", "delay_s": "delay"},
+        live=deferred("protocols.laser_calibration.live:error_view"),
+    ),
 )

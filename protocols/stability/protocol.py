@@ -149,5 +149,6 @@ PROTOCOL = Protocol(
             "angle_predicted_rad": "predicted angle of μ",
         },
         matrix=(Axis("amplitude_factor", "amplitude_factor", "A {:g}"), Axis("omega", "omega_rad_s", "{:g} rad/s")),
+        live=deferred("protocols.stability.live:multiplier_view"),
     ),
 )

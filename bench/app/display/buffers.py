@@ -42,6 +42,11 @@ class Ring:
         """Discard all bins."""
         self._end = self._size = 0
 
+    def discard_before(self, time: float) -> None:
+        """Discard the bins that end at or before bench time `time` [s]."""
+        first = self._end - self._size
+        self._size -= int(np.searchsorted(self._time[first : self._end], time, side="right"))
+
     def add(self, traces: Traces) -> None:
         """Append the bins of a block."""
         times = traces.begin + traces.step * np.arange(1.0, len(traces.low) + 1.0, dtype=np.float64)

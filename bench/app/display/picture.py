@@ -65,22 +65,34 @@ def pose_of(
     block, the angle is that of the measured displacement, and storey 2 is drawn above storey 1.
     """
     motion = np.nan_to_num(motion)
-    angle, struck = block or (None, inf)
-    second = float(motion[U_2])
+    angle, struck = (0.0, inf) if arrangement.block_clamped else block or (None, inf)
+    frame = specimen.frame
+    first, second = float(motion[U_1]), float(motion[U_2])
+    if arrangement.pull:
+        # the signals were zeroed while storey 2 was held, which displaces storey 1 by the static force
+        first += frame.k2 / (frame.k1 + frame.k2) * arrangement.pull
+        second += arrangement.pull
     if arrangement.face is not None:
         zero = float(displacement(arrangement.tilt, arrangement.face, specimen.block))
         found = float(rotation(zero + second, arrangement.face, specimen.block))
-        angle, struck, second = found if isfinite(found) else None, inf, float(motion[U_1])
-    ground, first = float(motion[X_G]), float(motion[U_1])
+        angle, struck, second = found if isfinite(found) else None, inf, first
+    ground = float(motion[X_G])
     return Pose(factor * ground, factor * first, factor * second, None if angle is None else factor * angle, struck)
 
 
 def source(arrangement: Arrangement, pose: Pose) -> str:
-    """Text that states which parts of the picture are measured, modelled or unknown."""
+    """Text that states what is clamped, and which parts of the picture are measured, modelled or unknown."""
+    clamped = [text for field, text in texts.CLAMPED.items() if getattr(arrangement, field)]
+    return " ".join([*clamped, _measured(arrangement, pose)])
+
+
+def _measured(arrangement: Arrangement, pose: Pose) -> str:
     if arrangement.face is not None:
         return texts.BLOCK_BY_LASER.format(height=1e3 * arrangement.face)
     if not arrangement.block:
         return texts.FRAME
+    if arrangement.block_clamped:
+        return texts.FRAME_BY_LASERS
     return texts.FRAME_ONLY if pose.angle is None else texts.FRAME_AND_BLOCK
 
 

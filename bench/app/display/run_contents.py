@@ -1,12 +1,17 @@
 """Contents of a run display that follow from the events: verdict, current point, specimen, and last result."""
 
+from math import inf
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from bench.analysis.uncertainty import COVERAGE
 from bench.app.catalogue import load_protocol
 from bench.app.display import texts
+from bench.app.display.buffers import BlockAngle, Ring
 from bench.app.display.status import Arrangement
-from bench.app.display.typography import in_screen_unit, label, typeset
+from bench.app.display.typography import in_screen_unit, label, spaced, typeset
 from bench.app.display.verdict import running_verdict, verdict_of
 from bench.app.formatting import measurement
 from bench.app.ipc.messages import Run
@@ -14,6 +19,9 @@ from bench.events import Event, PointFinished, SpecimenMounted
 from bench.findings import FitFinished, TableIdentified
 from bench.live_values import Estimate, LiveValue, RunningGain
 from bench.protocol import Protocol
+
+ROUNDING = 1e-3
+"""Half a bin of the traces [s]: in virtual time, an action follows the last sample immediately."""
 
 
 class RunContents:
@@ -23,6 +31,7 @@ class RunContents:
     sentence : the verdict, or the running value, in one sentence.
     point : the current or last point.
     arrangement : the specimen on the table and the targets of the lasers.
+    arranged : bench time of the operator's last action [s]; earlier samples belong to another arrangement.
     result : the last fit, or the last response of the table.
     """
 
@@ -30,7 +39,8 @@ class RunContents:
         self.protocol: Protocol[Any] | None = None if run is None else load_protocol(run.protocol)
         self.sentence = texts.NO_GAIN if self.has_gain else texts.NO_RESULT
         self.point = ""
-        self.arrangement = Arrangement()
+        self.arrangement = Arrangement() if run is None else Arrangement.of(run.configuration.known_specimen)
+        self.arranged = -inf
         self.result: FitFinished | TableIdentified | None = None
         self._has_live_value = False
 
@@ -38,6 +48,15 @@ class RunContents:
     def has_gain(self) -> bool:
         """Whether the points of the protocol have a gain."""
         return self.protocol is None or "alpha_2" in self.protocol.point.model_fields
+
+    def instant(
+        self, ring: Ring, block: BlockAngle, moment: float
+    ) -> tuple[NDArray[np.float64], tuple[float, float] | None]:
+        """Signals and angle of the block at a bench time [s]; at rest, and unknown, before the first sample with the
+        present arrangement.
+        """
+        signals = ring.at(moment)
+        return (signals, block.at(moment)) if moment > self.arranged else (np.zeros_like(signals), None)
 
     def follow(self, event: Event) -> None:
         """Update the contents with an event."""
@@ -59,6 +78,7 @@ class RunContents:
                 self._show_result(event)
             case SpecimenMounted():
                 self.arrangement.follow(event)
+                self.arranged = event.time + ROUNDING
             case _:
                 pass
 
@@ -68,7 +88,7 @@ class RunContents:
         if protocol is None:
             return
         if protocol.log_line is not None:
-            self.sentence = typeset(protocol.log_line(event.point))
+            self.sentence = spaced(protocol.log_line(event.point))
         elif protocol.view.headline or not self._has_live_value:
             # for a protocol without a headline, the live value is the verdict
             self.sentence = verdict_of(protocol.view, event.point)

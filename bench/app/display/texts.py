@@ -128,7 +128,6 @@ BAND = "Shaded: band due to the uncertainty of the specimen's parameters (k = 2)
 BETA_AXIS = "stiffness ratio β [1]"
 OMEGA_AXIS, GAIN_AXIS = "circular frequency ω [rad/s]", "gain α₂ [1]"
 NO_GAIN, NO_RESULT, NO_GAIN_OF = "no gain yet", "no result yet", "no gain: {status}"
-RESPONSE = "table acceleration per drive"
 STEADY, SETTLING, GATHERING = "steady", "settling", "{done} of {needed} cycles"
 REPEATS = "repeats every {cycles} cycles"
 CHANGE = "{change:.2g} %"
@@ -370,7 +369,7 @@ NAMES = {
     "matrix": "points of the campaign",
     "state": "state of the bench",
     "alpha": "running result",
-    "live": "last result",
+    "live": "live view",
     "log": "event log",
     "queue": "queue",
     "picture": "picture of the specimen",
@@ -386,3 +385,19 @@ NAMES = {
     "steady": "steady state",
 }
 """Accessible names of widgets without a label."""
+LIVE_CHECK_TITLES = ("verdict", "line", "result")
+LIVE_CHECK_MARKS = {
+    "passed": ("✓", "passed", "good"),
+    "failed": ("▲", "FAILED", "alarm"),
+    "pending": ("…", "pending", "calm"),
+    "other": ("·", "without verdict", "calm"),
+}
+"""Mark, word and level of a line of the check on the Run page."""
+LIVE_CHECK_COUNT = "{n} {verdict}"
+CLAMPED = {
+    "table_locked": "Table clamped.",
+    "frame_clamped": "Storeys clamped to the table.",
+    "block_clamped": "Block clamped to the table.",
+}
+"""Text below the picture by field of `bench.app.display.status.Arrangement`."""
+FRAME_BY_LASERS = "Frame: measured"

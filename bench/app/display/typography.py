@@ -28,7 +28,7 @@ def label(name: str) -> str:
     return typeset(_SYMBOL.sub(lambda found: _LETTERS.get(found[1], found[1]) + found[2].translate(_LOW), plain))
 
 
-_SCREEN = {"m": (1e3, "mm")}
+_SCREEN = {"m": (1e3, "mm"), "um": (1.0, "µm")}
 
 
 def in_screen_unit(unit: str) -> tuple[float, str]:

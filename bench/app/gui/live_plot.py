@@ -1,70 +1,105 @@
 # pyright: reportUnknownMemberType=false, reportUnknownVariableType=false, reportUnknownArgumentType=false
 # pyright: reportMissingTypeStubs=false
-"""The live plot of protocols without a gain: the last fit with its data, or the last response of the table."""
+"""Plot of a panel of the live view, with its title and legend above the axes."""
 
+from html import escape
 from typing import Any
 
+import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
 
 from bench.app.display import texts
-from bench.app.display.figure import figure_of
+from bench.app.display.figure import Curve, Figure, figure_of
 from bench.app.display.theme import Theme
+from bench.app.gui.gain_plot import TICKS
 from bench.app.gui.widgets import colour_axes
-from bench.findings import FitFinished, TableIdentified
+from bench.live_view import Panel
 
-FEW = 40
-"""Largest number of values drawn with symbols."""
+INSIDE = (60, 8, 8, 44)
+"""Distances of the sentence from the edges of the plot [px], which leave the axes free."""
+KEYS = {"line": "──", "points": "●", "predicted": "╌╌"}
+"""Keys of the legend by style."""
+LEGEND = 4
+"""Largest number of curves in the legend; the tooltip has all of them."""
 
 
-class LivePlot(pg.PlotWidget):
-    """Plot of the series of a fit along its axis; draws those with the unit of the first series."""
+class LivePlot(QWidget):
+    """Axes with the curves of a panel; until there is a result, a sentence states what will appear."""
 
     def __init__(self, theme: Theme) -> None:
-        super().__init__(enableMenu=False)
+        super().__init__()
         self._theme = theme
-        self._shown: FitFinished | TableIdentified | None = None
-        self.setAccessibleName(texts.NAMES["live"])
-        self._item: Any = self.getPlotItem()
+        self._panel: Panel | None = None
+        self.figure = Figure("", "", "", (), "")
+        """What is drawn."""
+        self.heading = QLabel(wordWrap=True, textFormat=Qt.TextFormat.RichText)
+        self.plot = pg.PlotWidget()
+        self.plot.setAccessibleName(texts.NAMES["live"])
+        self._item: Any = self.plot.getPlotItem()
         self._item.showGrid(x=True, y=True, alpha=0.25)
-        self._legend = self._item.addLegend(offset=(-8, 8), labelTextSize="9pt")
-        self.drawn: list[str] = []
-        """Names of the drawn curves."""
+        self._item.setMenuEnabled(False)
+        self._item.hideButtons()
+        self.notice = QLabel(wordWrap=True, alignment=Qt.AlignmentFlag.AlignCenter, textFormat=Qt.TextFormat.RichText)
+        self.notice.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
+        over = QVBoxLayout(self.plot)
+        over.setContentsMargins(*INSIDE)
+        over.addWidget(self.notice)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(0)
+        column.addWidget(self.heading)
+        column.addWidget(self.plot, 1)
         self.use_theme(theme)
 
     def use_theme(self, theme: Theme) -> None:
         """Use the colours of another theme."""
         self._theme = theme
-        self.setBackground(theme.raised)
+        self.plot.setBackground(theme.raised)
         colour_axes(self._item, theme)
-        self._legend.setLabelTextColor(theme.text)
-        self._legend.setBrush(pg.mkBrush(theme.raised))
-        if self._shown is not None:
-            self.show_result(self._shown)
+        if self._panel is not None:
+            self.show_panel(self._panel)
 
-    def forget(self) -> None:
-        """Clear the plot for a new run."""
-        self._shown, self.drawn = None, []
-        self.clear()
-        self._legend.clear()
-        self._item.setTitle(None)
-        for side in ("left", "bottom"):
-            self._item.setLabel(side, "")
+    def show_panel(self, panel: Panel) -> None:
+        """Draw a panel."""
+        self._panel, self.figure = panel, figure_of(panel)
+        figure, item, theme = self.figure, self._item, self._theme
+        item.clear()
+        item.setLogMode(x="x" in panel.logarithmic, y="y" in panel.logarithmic)
+        for side, axis in (("bottom", "x"), ("left", "y")):
+            item.getAxis(side).setTicks(TICKS if axis in panel.logarithmic else None)
+        item.setAspectLocked(panel.equal)
+        item.setLabel("bottom", figure.x_label, color=theme.text)
+        item.setLabel("left", figure.y_label, color=theme.text)
+        drawn = [curve for curve in figure.curves if curve.style != "reference"]
+        colours = {id(curve): theme.lines[place % len(theme.lines)] for place, curve in enumerate(drawn)}
+        for curve in figure.curves:
+            self._draw(curve, colours.get(id(curve), theme.faint))
+        keys = (f'<span style="color: {colours[id(curve)]}">{KEYS[curve.style]}</span>' for curve in drawn)
+        # lines break between the curves only
+        names = (escape(curve.name).replace(" ", "&nbsp;") for curve in drawn)
+        entries = [f"{key}&nbsp;{name}" for key, name in zip(keys, names, strict=True)]
+        shown = " &nbsp;".join(entries[:LEGEND] + ["…"] * (len(entries) > LEGEND))
+        title = f"<b>{escape(figure.title)}</b> &nbsp;" if figure.title else ""
+        self.heading.setText(f'<span style="font-size: 8pt">{title}{shown}</span>')
+        self.heading.setToolTip("\n".join(curve.name for curve in drawn) if len(entries) > LEGEND else "")
+        # predicted lines may pass behind the sentence
+        self.notice.setText(f'<span style="background-color: {theme.raised}">{escape(figure.notice)}</span>')
+        self.notice.setVisible(bool(figure.notice))
+        item.enableAutoRange()
 
-    def show_result(self, event: FitFinished | TableIdentified) -> None:
-        """Draw a finished fit, or the response of the table."""
-        self.forget()
-        self._shown, figure = event, figure_of(event)
-        if figure.title:
-            self._item.setTitle(figure.title, color=self._theme.text, size="10pt", justify="left")
-        self._item.setLabel("bottom", figure.x_label, color=self._theme.text)
-        self._item.setLabel("left", figure.y_label, color=self._theme.text)
-        for number, curve in enumerate(figure.curves):
-            colour = self._theme.lines[number % len(self._theme.lines)]
-            style = Qt.PenStyle.DashLine if curve.fitted else Qt.PenStyle.SolidLine
-            few = len(curve.y) <= FEW
-            symbol = {"symbol": "o", "symbolSize": 7, "symbolBrush": colour, "symbolPen": colour} if few else {}
-            pen = pg.mkPen(colour, width=2 if curve.fitted else 1, style=style)
-            self.plot(curve.x, curve.y, pen=pen, name=curve.name, connect="finite", **symbol)
-            self.drawn.append(curve.name)
-        self._item.enableAutoRange()
+    def _draw(self, curve: Curve, colour: str) -> None:
+        if curve.style == "points":
+            if curve.low is not None and curve.high is not None and np.isfinite(curve.low).any():
+                ends = np.column_stack((curve.low, curve.high)).ravel()
+                self._item.plot(np.repeat(curve.x, 2), ends, pen=pg.mkPen(colour, width=1), connect="pairs")
+            outline = pg.mkPen(self._theme.text, width=1)
+            self._item.plot(curve.x, curve.y, pen=None, symbol="o", symbolSize=8, symbolBrush=colour, symbolPen=outline)
+            return
+        style = Qt.PenStyle.DashLine if curve.style == "predicted" else Qt.PenStyle.SolidLine
+        pen = pg.mkPen(colour, width=2 if curve.style == "predicted" else 1, style=style)
+        # a single value has no line
+        alone = np.count_nonzero(np.isfinite(curve.x) & np.isfinite(curve.y)) == 1
+        mark = {"symbol": "x", "symbolSize": 10, "symbolPen": colour, "symbolBrush": colour} if alone else {}
+        self._item.plot(curve.x, curve.y, pen=pen, connect="finite", **mark)

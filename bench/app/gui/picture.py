@@ -109,7 +109,7 @@ class PhysicalPicture(QWidget):
     def use(self, specimen: Specimen) -> None:
         """Draw another specimen, at rest."""
         self.canvas.specimen = specimen
-        self.show_arrangement(Arrangement())
+        self.show_arrangement(Arrangement.of(specimen))
         self.move_to(np.zeros(len(TRACES)), None)
         self.canvas.update()
 

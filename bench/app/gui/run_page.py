@@ -6,7 +6,6 @@ from PySide6.QtWidgets import (
     QHBoxLayout,
     QPushButton,
     QSplitter,
-    QStackedWidget,
     QTabWidget,
     QVBoxLayout,
     QWidget,
@@ -20,8 +19,7 @@ from bench.app.display.typography import typeset
 from bench.app.formatting import ABSENT, clock
 from bench.app.gui.campaign_matrix import MatrixView
 from bench.app.gui.controller import PERIOD, Controller
-from bench.app.gui.gain_plot import GainPlot
-from bench.app.gui.live_plot import LivePlot
+from bench.app.gui.live_view import LiveViewArea
 from bench.app.gui.log_panel import LogPanel
 from bench.app.gui.meters import MetersView
 from bench.app.gui.motion_plot import KINDS, MotionPlot
@@ -32,9 +30,8 @@ from bench.app.gui.verdict import VerdictLabel
 from bench.app.gui.widgets import FITTING, ElidingLabel, give_key, scrolling, set_level
 from bench.app.ipc.messages import Opened, Run, Traces
 from bench.datafile.tables import Table
-from bench.events import Event, PointFinished, StepStarted
-from bench.findings import FitFinished, TableIdentified
-from bench.live_values import Estimate, RunningGain, TwinEstimate
+from bench.events import Event, StepStarted
+from bench.live_values import Estimate, TwinEstimate
 
 GAINS_HEIGHT, LOWEST = 150, 540
 """Minimum heights [px] of the protocol's plot, for a readable axis, and of the page, for a complete picture."""
@@ -50,11 +47,9 @@ class RunPage(QWidget):
     def __init__(self, controller: Controller, theme: Theme) -> None:
         super().__init__()
         self._controller = controller
-        self.traces, self.gains, self.steady = TracePlot(theme), GainPlot(theme), SteadyView()
+        self.traces, self.live, self.steady = TracePlot(theme), LiveViewArea(theme), SteadyView()
+        self.gains = self.live.gains
         self.motion = tuple(MotionPlot(theme, kind) for kind in KINDS)
-        self.live, self.shown_plot = LivePlot(theme), QStackedWidget()
-        for plot in (self.gains, self.live):
-            self.shown_plot.addWidget(plot)
         self.contents = RunContents()
         self.picture, self.block = PhysicalPicture(theme), BlockAngle()
         self.meters, self.matrix = MetersView(theme), MatrixView(theme)
@@ -82,12 +77,12 @@ class RunPage(QWidget):
 
     def use_theme(self, theme: Theme) -> None:
         """Use the colours of another theme."""
-        for part in (self.traces, self.gains, self.live, self.picture, self.meters, self.matrix, *self.motion):
+        for part in (self.traces, self.live, self.picture, self.meters, self.matrix, *self.motion):
             part.use_theme(theme)
 
     def predict(self, prediction: Table) -> None:
         """Show the predicted lines of the next run."""
-        self.gains.predict(prediction)
+        self.live.predict(prediction)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Choose the size of the verdict."""
@@ -105,8 +100,8 @@ class RunPage(QWidget):
         row.addWidget(self.ramp_out)
         column.addLayout(row)
         column.addWidget(self.verdict)
-        self.shown_plot.setMinimumHeight(GAINS_HEIGHT)
-        column.addWidget(self.shown_plot, 1)
+        self.live.setMinimumHeight(GAINS_HEIGHT)
+        column.addWidget(self.live, 1)
         column.addStretch(0)
         for part in (self.twin, self.lost):
             column.addWidget(part)
@@ -149,10 +144,6 @@ class RunPage(QWidget):
             plot.forget()
         self.panel.clear()
         contents = self.contents = RunContents(run)
-        self.live.forget()
-        self.shown_plot.setCurrentWidget(self.gains if contents.has_gain else self.live)
-        # without a gain there is nothing to draw before the first result
-        self.shown_plot.setVisible(contents.has_gain)
         self.point.setText("")
         self.verdict.show_sentence(contents.sentence)
         self.picture.use(run.configuration.known_specimen)
@@ -161,6 +152,7 @@ class RunPage(QWidget):
         self.block = BlockAngle()
         self.meters.use(run.configuration)
         if contents.protocol is not None:
+            self.live.begin(contents.protocol, run)
             self.matrix.begin(contents.protocol, run)
 
     def _open(self, opened: Opened) -> None:
@@ -168,7 +160,8 @@ class RunPage(QWidget):
         if self._controller.session.run is not None and opened.margins:
             self.meters.use(self._controller.session.run.configuration, opened.margins)
         if self._controller.session.attached is not None:
-            self.gains.predict(opened.prediction)
+            self.live.predict(opened.prediction)
+        self.live.open(opened.prediction)
 
     def _trace(self, traces: list[Traces]) -> None:
         self.traces.add(traces)
@@ -184,37 +177,29 @@ class RunPage(QWidget):
             return
         shown = self.tabs.currentWidget()
         self.traces.draw()
+        self.live.draw()
         if isinstance(shown, MotionPlot):
             shown.draw(self.traces.ring)
         moment = self.block.nearest(self.traces.moment)
-        self.picture.move_to(self.traces.ring.at(moment), self.block.at(moment))
+        self.picture.move_to(*self.contents.instant(self.traces.ring, self.block, moment))
         self.picture.show_age(self.traces.stale)
         self.meters.show_live(live=self.traces.stale is None and self._controller.running)
 
     def _tell(self, event: Event) -> None:
         self.matrix.follow(event, self._controller.session.scene.time_left)
+        self.live.follow(event)
         contents = self.contents
         contents.follow(event)
         self.point.setText(contents.point)
         self.verdict.show_sentence(contents.sentence)
         if contents.arrangement != self.picture.canvas.arrangement:
             self.picture.show_arrangement(contents.arrangement)
-            self.traces.watch_block(contents.arrangement.face)
+            self.traces.watch_block(contents.arrangement.face, contents.arranged)
         match event:
             case Estimate():
-                self.gains.show_running(event)
                 self.steady.point(event.omega, event.beta)
                 for plot in self.motion:
                     plot.omega = event.omega
-            case RunningGain():
-                self.gains.show_running(event)
-            case PointFinished() if "alpha_2" in type(event.point).model_fields:
-                self.shown_plot.setCurrentWidget(self.gains)
-                self.shown_plot.show()
-                self.gains.add(event.point.model_dump())
-            case FitFinished() | TableIdentified() if event is contents.result:
-                self.shown_plot.show()
-                self.live.show_result(event)
             case StepStarted():
                 self.steady.finish()
                 for plot in self.motion:

@@ -78,10 +78,13 @@ class TracePlot(QWidget):
         """Label, displayed unit, and displayed units per SI unit for each trace."""
         return labels_of(self._further, self._face)
 
-    def watch_block(self, face: float | None) -> None:
-        """Label the traces for laser 2 on the block's face at this height [m]; None for storey 2."""
+    def watch_block(self, face: float | None, since: float = 0.0) -> None:
+        """Label the traces for laser 2 on the block's face at this height [m], None for storey 2, from bench time
+        `since` [s]; earlier samples, of another target, are discarded.
+        """
         if face != self._face:
-            self._face = face
+            self._face, self._fresh = face, True
+            self.ring.discard_before(since)
             self.use_theme(self._theme)
 
     def use_theme(self, theme: Theme) -> None:

@@ -59,21 +59,25 @@ class VerdictLabel(QLabel):
         painter.end()
 
     def sizeHint(self) -> QSize:
-        return QSize(0, self._needed(self.pixels))
+        return QSize(0, self._box(self.pixels).height())
 
     @property
     def pixels(self) -> int:
         """Largest size of the font with which the text fits [px]."""
         sizes: Sequence[int] = range(LARGEST, SMALLEST, -2)
-        return next((size for size in sizes if self._needed(size) <= self._space), SMALLEST)
+        return next((size for size in sizes if self._fits(self._box(size))), SMALLEST)
 
-    def _needed(self, pixels: int) -> int:
+    def _fits(self, box: QRect) -> bool:
+        # an unbroken part may be wider than the label
+        return box.height() <= self._space and box.width() <= max(self.width(), 1)
+
+    def _box(self, pixels: int) -> QRect:
         box = QRect(0, 0, max(self.width(), 1), 10_000)
-        return QFontMetrics(_font(self.font(), pixels)).boundingRect(box, FLAGS, self.text()).height()
+        return QFontMetrics(_font(self.font(), pixels)).boundingRect(box, FLAGS, self.text())
 
     def _fit(self) -> None:
         self._size = self.pixels
-        self.setFixedHeight(min(self._needed(self._size), self._space))
+        self.setFixedHeight(min(self._box(self._size).height(), self._space))
         self.update()
 
 

@@ -102,7 +102,8 @@ def _picture(record: RunRecord) -> dict[str, object] | None:
         return None
     specimen, arrangement = run.configuration.known_specimen, record.contents.arrangement
     outline, moment = Outline(specimen), record.moment
-    pose = pose_of(record.ring.at(moment), record.block.at(moment), arrangement, specimen, FACTOR)
+    signals, angle = record.contents.instant(record.ring, record.block, moment)
+    pose = pose_of(signals, angle, arrangement, specimen, FACTOR)
     return {
         "box": _rounded([*outline.ends, outline.height], 4),
         "shapes": [

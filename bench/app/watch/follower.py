@@ -88,7 +88,11 @@ class RunRecord:
             case Opened():
                 self._open(message)
             case Published(event):
+                face = self.contents.arrangement.face
                 self.contents.follow(event)
+                if face != self.contents.arrangement.face:
+                    # earlier samples of laser 2 are those of another target
+                    self.ring.discard_before(self.contents.arranged)
                 if self.campaign is not None:
                     self.campaign.follow(event)
                 match event:

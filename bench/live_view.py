@@ -1,0 +1,222 @@
+"""Live view of a run: what the window shows below the verdict, declared by the protocol as one function.
+
+The function receives a `LiveRun`, what the run has published so far, and returns the parts of the view, mostly `Panel`.
+It is called before the first result, when the parts show predictions and state what will appear, and after each result.
+"""
+
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal, TypeAlias, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from bench.config.model import BenchConfiguration
+from bench.datafile.tables import Table
+from bench.events import Event, PointFinished, Progress, StateChanged, StepStarted, Warned
+from bench.findings import FitFinished, TableIdentified
+from bench.live_values import Estimate, LiveValue, RunningGain, TwinEstimate
+from sim.parameters import Parameters
+
+Array = NDArray[np.float64]
+E = TypeVar("E", bound=Event)
+
+FITS, KEPT = 60, 2000
+"""Largest numbers of kept fits, which contain recordings, and of kept events of any other kind but points."""
+MOST = 6
+"""Largest number of curves of a fit in a panel."""
+DERIVED = ("residual", "uncertainty")
+"""Suffixes of the names of series of a fit that are not drawn."""
+FITTED = "fitted"
+"""Suffix of the names of series of a fit that are computed by its model."""
+_ELSEWHERE = (Progress, StateChanged, StepStarted, Warned, Estimate, RunningGain, TwinEstimate)
+"""Frequent events that other parts of the window show."""
+
+Style: TypeAlias = Literal["line", "points", "predicted", "reference"]
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """A curve in SI units; `x`, `y` and the expanded uncertainties `spread`, if any, have the shape (n,)."""
+
+    name: str
+    x: Array
+    y: Array
+    style: Style
+    spread: Array | None = None
+
+    @property
+    def measured(self) -> bool:
+        """Whether the curve is a result of the run."""
+        return self.style in ("line", "points")
+
+
+@dataclass(eq=False)
+class Panel:
+    """Axes with curves in the SI units of `x` and `y`, each a name with its unit, "1" for a pure number.
+
+    awaits : sentence shown until there is a result: what will appear, and when.
+    logarithmic : axes with a logarithmic scale, such as "xy".
+    equal : whether both axes have the same scale, as for a complex plane.
+    """
+
+    title: str
+    x: tuple[str, str] = ("", "1")
+    y: tuple[str, str] = ("", "1")
+    awaits: str = ""
+    logarithmic: Literal["", "x", "y", "xy"] = ""
+    equal: bool = False
+    curves: list[Curve] = field(default_factory=list[Curve])
+
+    @property
+    def empty(self) -> bool:
+        """Whether there is no result yet."""
+        return not any(curve.measured for curve in self.curves)
+
+    def line(self, name: str, x: ArrayLike, y: ArrayLike) -> "Panel":
+        """Add a measured line; returns the panel."""
+        return self._add(name, x, y, "line")
+
+    def points(self, name: str, x: ArrayLike, y: ArrayLike, spread: ArrayLike | None = None) -> "Panel":
+        """Add measured points with their expanded uncertainties, NaN if unknown; returns the panel."""
+        return self._add(name, x, y, "points", spread)
+
+    def predicted(self, name: str, x: ArrayLike, y: ArrayLike) -> "Panel":
+        """Add a predicted or fitted line; returns the panel."""
+        return self._add(name, x, y, "predicted")
+
+    def reference(self, x: ArrayLike, y: ArrayLike) -> "Panel":
+        """Add a thin line without a name, such as the unit circle; returns the panel."""
+        return self._add("", x, y, "reference")
+
+    def fit(self, fit: FitFinished) -> "Panel":
+        """Add the series of a fit that have the unit of `y`, by their names, against its axis; returns the panel."""
+        (_, along), *others = fit.columns.items()
+        chosen = [
+            (name, series.values)
+            for name, series in others
+            if series.unit == self.y[1] and not name.endswith(DERIVED) and np.isfinite(series.values).any()
+        ]
+        for name, values in chosen[:MOST]:
+            self._add(name, along.values, values, "predicted" if name.endswith(FITTED) else "line")
+        return self
+
+    def _add(self, name: str, x: ArrayLike, y: ArrayLike, style: Style, spread: ArrayLike | None = None) -> "Panel":
+        place, value = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
+        doubt = None if spread is None else np.asarray(spread, dtype=np.float64)
+        if (np.isfinite(place) & np.isfinite(value)).any():
+            self.curves.append(Curve(name, place, value, style, doubt))
+        return self
+
+
+@dataclass(frozen=True)
+class GainCurve:
+    """The gain alpha_2 of the points on its predicted lines, over the frequency or, under records, the stiffness."""
+
+
+Verdict: TypeAlias = Literal["passed", "failed", "pending", "other"]
+
+
+@dataclass(frozen=True)
+class Check:
+    """A line of a checklist: what is checked, its verdict, and the measured value or the remedy as text."""
+
+    what: str
+    verdict: Verdict
+    text: str = ""
+
+
+@dataclass(frozen=True)
+class Checklist:
+    """Checks in the order of the run, with those that are still pending."""
+
+    checks: tuple[Check, ...]
+
+
+LiveView: TypeAlias = Sequence[Panel | GainCurve | Checklist]
+
+
+@dataclass(eq=False)
+class LiveRun:
+    """What a run has published so far. `point` is the class of its points; `prediction` is empty until it is known."""
+
+    point: type[Parameters]
+    parameters: Any
+    configuration: BenchConfiguration
+    prediction: Table = field(default_factory=dict[str, Any])
+    _kept: dict[type[Event], deque[Event]] = field(default_factory=dict[type[Event], deque[Event]], init=False)
+
+    def follow(self, event: Event) -> bool:
+        """Keep an event; returns whether the view may have changed."""
+        if isinstance(event, _ELSEWHERE):
+            return False
+        kind = type(event)
+        if kind not in self._kept:
+            limit = FITS if kind is FitFinished else None if kind is PointFinished else KEPT
+            self._kept[kind] = deque(maxlen=limit)
+        self._kept[kind].append(event)
+        return True
+
+    def events(self, kind: type[E]) -> list[E]:
+        """The events of this type, in order."""
+        return [event for event in self._kept.get(kind, ()) if isinstance(event, kind)]
+
+    @property
+    def points(self) -> list[Parameters]:
+        """The finished points, in order."""
+        return [event.point for event in self.events(PointFinished)]
+
+    @property
+    def fits(self) -> list[FitFinished]:
+        """The finished fits, in order."""
+        return self.events(FitFinished)
+
+    def column(self, field: str, points: Sequence[Parameters] | None = None) -> Array:
+        """A field of all or of the given `points`, shape (n,); NaN where it is absent."""
+        values = [getattr(point, field) for point in (self.points if points is None else points)]
+        return np.array([np.nan if value is None else value for value in values], dtype=np.float64)
+
+    def predicted(self, column: str) -> Array:
+        """A column of the prediction, shape (n,); empty until the prediction is known."""
+        found = self.prediction.get(column)
+        return np.zeros(0) if found is None else found.values.astype(np.float64)
+
+
+Live: TypeAlias = Callable[[LiveRun], LiveView]
+
+
+def standard_view(run: LiveRun) -> LiveView:
+    """View of a protocol that declares none: its gains, its last fit, the response of the table, or its live values."""
+    if "alpha_2" in run.point.model_fields or any("alpha_2" in type(point).model_fields for point in run.points):
+        return (GainCurve(),)
+    if run.fits:
+        fit = run.fits[-1]
+        (axis, along), *others = fit.columns.items()
+        unit = others[0][1].unit if others else "1"
+        return (Panel(fit.name, (axis, along.unit), ("", unit)).fit(fit),)
+    if tables := run.events(TableIdentified):
+        return (response_panel(tables[-1]),)
+    values = run.events(LiveValue)
+    panels = {value.unit: Panel("", ("bench time", "s"), ("", value.unit)) for value in values}
+    for label in dict.fromkeys(value.label for value in values):
+        own = [value for value in values if value.label == label]
+        time = [value.time for value in own]
+        panel = panels[own[-1].unit]
+        panel.points(label, time, [value.value for value in own], [value.uncertainty for value in own])
+        panel.predicted(f"{label}, predicted", time, [value.predicted for value in own])
+    return tuple(panels.values()) or (Panel("", awaits="Results of the run appear here."),)
+
+
+def response_panel(table: TableIdentified | None) -> Panel:
+    """The magnitude of the table's response over the frequency; None before it is identified."""
+    panel = Panel(
+        "response of the table",
+        ("frequency", "Hz"),
+        ("response", "m/s2/V"),
+        awaits="The response of the table appears here when all multisines have been played.",
+        logarithmic="xy",
+    )
+    if table is not None:
+        panel.line("response", table.frequency, np.hypot(table.real, table.imaginary))
+    return panel

@@ -1,0 +1,92 @@
+"""One short run of every protocol in virtual time, as the messages of its session, with the state of the simulated
+bench at each of them: tests of the Run page share these instead of starting sessions.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+from bench.app.catalogue import load_protocol
+from bench.app.ipc.broadcast import Reduction
+from bench.app.ipc.messages import FromSession, Opened, Published, Run, Traces
+from bench.config.model import BenchConfiguration
+from bench.config.sections import Simulation
+from bench.engine.engine import configured_engine
+from bench.engine.interface import EventStream, Requests, Unattended
+from bench.events import Acquired, Event, ValuesReceived
+from drivers.clock import VirtualClock
+from drivers.simulated import SimulatedRig
+from protocols.check.protocol import CheckParameters
+from protocols.common.identification.parameters import IdentifyParameters
+from protocols.coupling_stiffness.protocol import CouplingStiffnessParameters
+from protocols.earthquake.protocol import EarthquakeParameters
+from protocols.free_rocking.protocol import FreeRockingParameters
+from protocols.free_vibration.protocol import FreeVibrationParameters
+from protocols.harmonic.protocol import HarmonicParameters
+from protocols.laser_calibration.protocol import LaserCalibrationParameters
+from protocols.stability.protocol import StabilityParameters
+from sim.arrangement import Arrangement
+from sim.parameters import Parameters
+from sim.virtual_bench import VirtualBenchParameters
+
+PARAMETERS: dict[str, Parameters] = {
+    "check": CheckParameters(omega=(12.0, 18.0, 27.0, 40.0), cycles=4),
+    "laser-calibration": LaserCalibrationParameters(passes=6, cycles=4),
+    "identify": IdentifyParameters(period=2.0, band_low=0.5, band_high=60.0, periods=2),
+    "free-vibration": FreeVibrationParameters(repeats=2, window=10.0),
+    "coupling-stiffness": CouplingStiffnessParameters(beta=(0.64,), repeats=2, window=10.0),
+    "free-rocking": FreeRockingParameters(tilts=(0.5,)),
+    "harmonic": HarmonicParameters(omega=(16.0,), beta=(0.4,), measured_cycles=8),
+    "earthquake": EarthquakeParameters(
+        records=("synthetic:kobe",), beta=(0.64,), table_band="1.5:25", length_ratio=0.25, draws=40, decay=1.0, passes=2
+    ),
+    "stability": StabilityParameters(omega=(15.3,), released_cycles=24),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Moment:
+    """A message of the session, and the simulated bench when it was sent."""
+
+    message: FromSession
+    bench: Arrangement
+
+
+@dataclass(frozen=True, eq=False)
+class ShortRun:
+    """The order of a run, and all messages of its session in order."""
+
+    run: Run
+    moments: Sequence[Moment]
+
+
+@cache
+def short_run(name: str) -> ShortRun:
+    """Carry out the protocol on a simulated bench; raises AssertionError unless the run is completed."""
+    simulation = Simulation(bench=VirtualBenchParameters(sample_rate=1000.0))
+    configuration = BenchConfiguration(simulation=simulation)
+    protocol = load_protocol(name)
+    prepared = protocol.prepare(PARAMETERS[name], configuration, None)
+    rig = SimulatedRig(
+        simulation.bench,
+        configuration.specimen,
+        seed=simulation.seed,
+        clock=VirtualClock(),
+        lead=configuration.lead_samples,
+    )
+    names = tuple(channel.name for channel in rig.channels)
+    moments = [Moment(Opened(names, rig.sample_rate, {}, prediction=prepared.prediction), rig.bench.arrangement)]
+    reduced: Callable[[Acquired], Traces] = Reduction(rig.sample_rate)
+
+    def keep(event: Event) -> None:
+        if not isinstance(event, ValuesReceived):
+            message = reduced(event) if isinstance(event, Acquired) else Published(event)
+            moments.append(Moment(message, rig.bench.arrangement))
+
+    requests = Requests()
+    engine = configured_engine(rig, configuration, EventStream(rig.clock, [keep]), requests, Unattended())
+    ending = engine.run(prepared.plan())
+    assert ending.status == "completed", ending.reason
+    rig.close()
+    return ShortRun(Run(name, PARAMETERS[name], configuration, Path("never")), moments)
