@@ -64,7 +64,7 @@ class Panel:
     title: str
     x: tuple[str, str] = ("", "1")
     y: tuple[str, str] = ("", "1")
-    awaits: str = ""
+    awaits: str = "The results of the run appear here."
     logarithmic: Literal["", "x", "y", "xy"] = ""
     equal: bool = False
     curves: list[Curve] = field(default_factory=list[Curve])
@@ -105,6 +105,11 @@ class Panel:
     def _add(self, name: str, x: ArrayLike, y: ArrayLike, style: Style, spread: ArrayLike | None = None) -> "Panel":
         place, value = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
         doubt = None if spread is None else np.asarray(spread, dtype=np.float64)
+        shapes = {each.shape for each in (place, value, doubt) if each is not None}
+        if len(shapes) != 1 or place.ndim != 1:
+            raise ValueError(
+                f"the arrays of the curve {name!r} have shapes {shapes}; all must have the same shape (n,)"
+            )
         if (np.isfinite(place) & np.isfinite(value)).any():
             self.curves.append(Curve(name, place, value, style, doubt))
         return self
@@ -205,7 +210,7 @@ def standard_view(run: LiveRun) -> LiveView:
         panel = panels[own[-1].unit]
         panel.points(label, time, [value.value for value in own], [value.uncertainty for value in own])
         panel.predicted(f"{label}, predicted", time, [value.predicted for value in own])
-    return tuple(panels.values()) or (Panel("", awaits="Results of the run appear here."),)
+    return tuple(panels.values()) or (Panel(""),)
 
 
 def response_panel(table: TableIdentified | None) -> Panel:

@@ -1,15 +1,34 @@
-"""Panels of a live view in displayed units, with typeset names. Independent of Qt."""
+"""The live view of a protocol: its parts, and panels in displayed units with typeset names. Independent of Qt."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.app.display import texts
 from bench.app.display.typography import in_screen_unit, label, typeset
-from bench.live_view import Panel, Style
+from bench.live_view import Checklist, GainCurve, LiveRun, LiveView, Panel, Style, standard_view
+from bench.plugins import plugin_code
+from bench.protocol import Protocol
+from sim.errors import RockbenchError
 
 LEAST = 1e-3
 """Lower end of an uncertainty on a logarithmic axis, relative to the value, where the interval includes zero."""
+
+
+def live_view(protocol: Protocol[Any], run: LiveRun) -> LiveView:
+    """The parts of the live view. An error in the protocol's function is shown in their place: it must not affect the
+    display of the bench.
+    """
+    try:
+        with plugin_code(f"the live view of {protocol.name}"):
+            parts = tuple((protocol.view.live or standard_view)(run))
+            if strange := [part for part in parts if not isinstance(part, Panel | GainCurve | Checklist)]:
+                raise TypeError(f"{type(strange[0]).__name__} is no part of a live view")
+            return parts
+    except RockbenchError as error:
+        return (Panel("", awaits=texts.LIVE_FAILED.format(error=error)),)
 
 
 @dataclass(frozen=True, eq=False)

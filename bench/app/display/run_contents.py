@@ -32,7 +32,6 @@ class RunContents:
     point : the current or last point.
     arrangement : the specimen on the table and the targets of the lasers.
     arranged : bench time of the operator's last action [s]; earlier samples belong to another arrangement.
-    result : the last fit, or the last response of the table.
     """
 
     def __init__(self, run: Run | None = None) -> None:
@@ -41,7 +40,6 @@ class RunContents:
         self.point = ""
         self.arrangement = Arrangement() if run is None else Arrangement.of(run.configuration.known_specimen)
         self.arranged = -inf
-        self.result: FitFinished | TableIdentified | None = None
         self._has_live_value = False
 
     @property
@@ -99,7 +97,6 @@ class RunContents:
         self.point = texts.LAST_POINT.format(status=point.get("status", ""), point=where)
 
     def _show_result(self, event: FitFinished | TableIdentified) -> None:
-        self.result = event
         if isinstance(event, FitFinished) and event.parameters:
             name, found = next(iter(event.parameters.items()))
             factor, unit = in_screen_unit(found.unit)

@@ -401,3 +401,4 @@ CLAMPED = {
 }
 """Text below the picture by field of `bench.app.display.status.Arrangement`."""
 FRAME_BY_LASERS = "Frame: measured"
+LIVE_FAILED = "{error}. The run is not affected."

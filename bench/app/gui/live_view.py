@@ -5,6 +5,7 @@ from typing import Any
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QSplitter, QVBoxLayout, QWidget
 
+from bench.app.display.figure import live_view
 from bench.app.display.theme import Theme
 from bench.app.gui.check_table import CheckTable
 from bench.app.gui.gain_plot import GainPlot
@@ -13,7 +14,7 @@ from bench.app.ipc.messages import Run
 from bench.datafile.tables import Table
 from bench.events import Event, PointFinished
 from bench.live_values import Estimate, RunningGain
-from bench.live_view import Checklist, GainCurve, LiveRun, Panel, standard_view
+from bench.live_view import Checklist, GainCurve, LiveRun, Panel
 from bench.protocol import Protocol
 
 
@@ -87,7 +88,7 @@ class LiveViewArea(QWidget):
         self._changed = False
         if self._protocol is None or self._run is None:
             return
-        view = (self._protocol.view.live or standard_view)(self._run)
+        view = live_view(self._protocol, self._run)
         panels = [part for part in view if isinstance(part, Panel)]
         while len(self.plots) < len(panels):
             self.plots.append(LivePlot(self._theme))

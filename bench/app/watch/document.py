@@ -138,12 +138,13 @@ def _cell(record: RunRecord, campaign: Campaign, place: tuple[int, int]) -> list
 
 
 def _figure(record: RunRecord) -> dict[str, object] | None:
-    """The predicted lines of the gain, or the last fit."""
+    """The predicted lines of the gain, or a panel of the live view with measured lines."""
     contents = record.contents
-    if contents.result is not None:
-        found = figure_of(contents.result)
+    if (panel := record.panel) is not None:
+        found = figure_of(panel)
         curves = [
-            {"name": curve.name, "fitted": curve.fitted, "points": _thinned(curve.x, curve.y)} for curve in found.curves
+            {"name": curve.name, "fitted": curve.style == "predicted", "points": _thinned(curve.x, curve.y)}
+            for curve in found.curves
         ]
         return {"kind": "fit", "title": found.title, "x": found.x_label, "y": found.y_label, "curves": curves}
     if (record.kind is None and not record.marks) or not contents.has_gain:

@@ -9,6 +9,7 @@ from bench.analysis.signals import Further
 from bench.app.display import texts
 from bench.app.display.buffers import BlockAngle, Ring
 from bench.app.display.campaign import Campaign
+from bench.app.display.figure import live_view
 from bench.app.display.gains import Line, Mark, kind_of, lines_of, mark_of
 from bench.app.display.meters import Meter, meters_of
 from bench.app.display.run_contents import RunContents
@@ -22,6 +23,7 @@ from bench.app.ipc.sessions import RunningSession, running_sessions
 from bench.app.run_display import Notice
 from bench.events import PointFinished, State
 from bench.live_values import Estimate, RunningGain, TwinEstimate
+from bench.live_view import LiveRun, Panel
 from drivers.clock import now
 
 SEARCH = 0.5
@@ -36,6 +38,7 @@ class RunRecord:
     def __init__(self, session: RunningSession | None = None) -> None:
         self.state = SessionState(session)
         self.contents = RunContents()
+        self.live: LiveRun | None = None
         self.meters: list[Meter] = []
         self.campaign: Campaign | None = None
         self.further: tuple[Further, ...] = ()
@@ -71,6 +74,15 @@ class RunRecord:
         """Bench time [s] of the picture, at which table, frame and block are known."""
         return self.block.nearest(self.ring.newest - max(self._length - self.age, 0.0))
 
+    @property
+    def panel(self) -> Panel | None:
+        """The first panel of the live view with measured lines; None for a protocol with gains."""
+        protocol = self.contents.protocol
+        if protocol is None or self.live is None or self.contents.has_gain:
+            return None
+        panels = (part for part in live_view(protocol, self.live) if isinstance(part, Panel))
+        return next((panel for panel in panels if any(curve.style == "line" for curve in panel.curves)), None)
+
     def follow(self, message: FromSession) -> None:
         """Update the record with a message."""
         if isinstance(message, Traces):
@@ -83,8 +95,9 @@ class RunRecord:
             case Attached():
                 run = message.run
                 self.contents, self.meters = RunContents(run), meters_of(run.configuration)
-                if self.contents.protocol is not None:
-                    self.campaign = Campaign(self.contents.protocol, run)
+                if (protocol := self.contents.protocol) is not None:
+                    self.campaign = Campaign(protocol, run)
+                    self.live = LiveRun(protocol.point, run.parameters, run.configuration)
             case Opened():
                 self._open(message)
             case Published(event):
@@ -95,6 +108,8 @@ class RunRecord:
                     self.ring.discard_before(self.contents.arranged)
                 if self.campaign is not None:
                     self.campaign.follow(event)
+                if self.live is not None:
+                    self.live.follow(event)
                 match event:
                     case TwinEstimate():
                         self.block.add(event)
@@ -121,6 +136,8 @@ class RunRecord:
         self.further = opened.further
         self.ring = Ring(len(TRACES) + len(opened.further))
         self.lines, self.kind = lines_of(opened.prediction), kind_of(opened.prediction)
+        if self.live is not None:
+            self.live.prediction = opened.prediction
         if self.state.run is not None:
             self.meters = meters_of(self.state.run.configuration, opened.margins)
 

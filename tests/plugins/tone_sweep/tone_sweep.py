@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from functools import cached_property
-from math import sqrt, tau
 
 import numpy as np
 from pydantic import PositiveFloat
@@ -15,11 +14,11 @@ from bench.document.document import Picture, Section
 from bench.engine.steps import Arm, Calibrate, Dwell, Measured, OperatorAction, Publish, RampOut, Sweep
 from bench.events import PointFinished, StepStarted
 from bench.figures.style import new_figure, write_figure
-from bench.figures.text_table import TextColumn, text_table
 from bench.live_values import LiveValue
+from bench.live_view import LiveRun, Panel
 from bench.preflight.demands import load, response_of
 from bench.preflight.margins import Demand, Forecast, Stage, bounds
-from bench.protocol import Plan, Prepared, Protocol, Result
+from bench.protocol import Plan, Prepared, Protocol, Result, RunView
 from drivers.rig import OperatorTask
 from sim.parameters import Parameters, quantity
 
@@ -41,34 +40,29 @@ class SweepPoint(Parameters):
 
 
 class ToneSweep(Prepared[SweepParameters]):
-    """The sweep on a bench; without a known table nothing is predicted."""
-
     @cached_property
     def gains(self) -> np.ndarray:
         """Predicted gains [m/s2/V]; NaN where nothing is known of the table."""
         table, omega = response_of(self.configuration), np.array(self.parameters.omega)
-        mass = self.configuration.known_specimen.bare().mass
-        return omega * np.nan if table is None else table.gain(omega, mass)
+        return omega * np.nan if table is None else table.gain(omega, self.configuration.known_specimen.bare().mass)
 
     @cached_property
     def forecast(self) -> Forecast:
-        p, bare = self.parameters, self.configuration.known_specimen.bare()
-        length = sum((p.cycles + 2) * tau / omega + 2.0 for omega in p.omega)
+        p, mass = self.parameters, self.configuration.known_specimen.bare().mass
+        length = sum((p.cycles + 2) * 2.0 * np.pi / omega + 2.0 for omega in p.omega)
         if (table := response_of(self.configuration)) is None:
             return Forecast(duration=length)
-        steps = [(float(gain) * p.volts, omega) for gain, omega in zip(self.gains, p.omega, strict=True)]
-        segments = tuple(
-            segment for level, omega in steps for segment in (Segment(1.0, level, omega), Segment(1.0, 0.0, omega))
-        )
-        mass, shaker, time = bare.mass, self.configuration.shaker_model, self.configuration.limits.heating_time
+        pairs = zip(self.gains.tolist(), p.omega, strict=True)
+        segments = tuple(Segment(1.0, level * p.volts, omega) for gain, omega in pairs for level in (gain, 0.0))
+        shaker, time = self.configuration.shaker_model, self.configuration.limits.heating_time
         demands = load(program(segments), 0.0, length, payload=mass, shaker=shaker, response=table, heating_time=time)
         found = [Demand(key, demands[key], None, "the sweep") for key in bounds(self.configuration) if key in demands]
         return Forecast(tuple(found), (Stage("the sweep", segments),), length)
 
     @cached_property
     def prediction(self) -> Table:
-        omega, gain = np.array(self.parameters.omega), Column(self.gains, "m/s2/V", "predicted gain")
-        return {"omega": Column(omega, "rad/s", "circular frequency"), "gain": gain}
+        omega = Column(np.array(self.parameters.omega), "rad/s", "circular frequency")
+        return {"omega": omega, "gain": Column(self.gains, "m/s2/V", "predicted gain")}
 
     def plan(self) -> Plan:
         p, bare, points = self.parameters, self.configuration.known_specimen.bare(), list[SweepPoint]()
@@ -82,7 +76,7 @@ class ToneSweep(Prepared[SweepParameters]):
             cycles = outcome.cycles[2:] if isinstance(outcome, Measured) else ()
             if len(cycles) >= 4:
                 gains = [abs(each.fundamental[ACCELERATION] / each.fundamental[len(SIGNALS)]) for each in cycles]
-                gain, doubt = float(np.mean(gains)), 2.0 * float(np.std(gains, ddof=1)) / sqrt(len(gains))
+                gain, doubt = float(np.mean(gains)), 2.0 * float(np.std(gains, ddof=1)) / len(gains) ** 0.5
                 yield Publish(LiveValue("gain of the table", gain, "m/s2/V", doubt, float(predicted)))
                 points.append(SweepPoint(omega_rad_s=omega, gain_m_s2_v=gain, gain_uncertainty=doubt))
                 yield Publish(PointFinished(points[-1]))
@@ -92,8 +86,7 @@ class ToneSweep(Prepared[SweepParameters]):
 
     def result(self, points: Sequence[Parameters]) -> Result:
         rows = [point.model_dump() for point in points]
-        columns = [TextColumn("omega", "rad/s"), TextColumn("gain", "m/s2/V"), TextColumn("U (k=2)", "m/s2/V")]
-        text = text_table(columns, [[f"{value:.4g}" for value in row.values()] for row in rows])
+        text = "\n".join(", ".join(f"{name} {value:.4g}" for name, value in row.items()) for row in rows)
         return Result(tuple(points), text, figures={"gain.png": lambda path: write_figure(path, drawn(rows))})
 
 
@@ -108,6 +101,12 @@ def report(campaign: Campaign) -> list[Section]:
     return [Section("sweep", "Tone sweep", [Picture(drawn(campaign.points), "Gain, k = 2.", "Gain over frequency.")])]
 
 
+def live(run: LiveRun) -> list[Panel]:
+    panel = Panel("", ("omega", "rad/s"), ("gain", "m/s2/V"))
+    panel.predicted("predicted", run.predicted("omega"), run.predicted("gain"))
+    return [panel.points("measured", *map(run.column, SweepPoint.model_fields))]
+
+
 PROTOCOL = Protocol(
     name="tone-sweep",
     summary="Gain of the table at a few frequencies.",
@@ -117,4 +116,5 @@ PROTOCOL = Protocol(
     prepare=ToneSweep,
     figures=("gain.png",),
     report=report,
+    view=RunView(live=live),
 )

@@ -31,18 +31,35 @@ from sim.parameters import Parameters
 from sim.virtual_bench import VirtualBenchParameters
 
 PARAMETERS: dict[str, Parameters] = {
-    "check": CheckParameters(omega=(12.0, 18.0, 27.0, 40.0), cycles=4),
+    "check": CheckParameters(cycles=4, rest=0.5),
     "laser-calibration": LaserCalibrationParameters(passes=6, cycles=4),
-    "identify": IdentifyParameters(period=2.0, band_low=0.5, band_high=60.0, periods=2),
-    "free-vibration": FreeVibrationParameters(repeats=2, window=10.0),
-    "coupling-stiffness": CouplingStiffnessParameters(beta=(0.64,), repeats=2, window=10.0),
-    "free-rocking": FreeRockingParameters(tilts=(0.5,)),
-    "harmonic": HarmonicParameters(omega=(16.0,), beta=(0.4,), measured_cycles=8),
-    "earthquake": EarthquakeParameters(
-        records=("synthetic:kobe",), beta=(0.64,), table_band="1.5:25", length_ratio=0.25, draws=40, decay=1.0, passes=2
+    "identify": IdentifyParameters(period=2.0, realisations=2, periods=2, discarded=1),
+    "free-vibration": FreeVibrationParameters(repeats=2, window=5.0),
+    "coupling-stiffness": CouplingStiffnessParameters(beta=(0.4,), repeats=1, window=5.0),
+    "free-rocking": FreeRockingParameters(tilts=(0.35,)),
+    "harmonic": HarmonicParameters(
+        omega=(20.0,),
+        beta=(0.25,),
+        measured_cycles=4,
+        ramp_time=2.0,
+        settle_tolerance=0.02,
+        amplitude_tolerance=0.02,
+        harmonics=1,
+        distortion_tolerance=0.1,
     ),
-    "stability": StabilityParameters(omega=(15.3,), released_cycles=24),
+    "earthquake": EarthquakeParameters(records=("synthetic:kobe",), beta=(0.97,), draws=40, passes=2, longest=8.0),
+    "stability": StabilityParameters(omega=(15.3,), released_cycles=24, bisect=False, starts=1),
 }
+
+
+def _bench(name: str) -> VirtualBenchParameters:
+    """Few samples per second, as many as the protocol needs."""
+    if name == "stability":
+        return VirtualBenchParameters(sample_rate=500.0)
+    rate, cutoff = (200.0, 50.0) if name == "free-rocking" else (125.0, 30.0)
+    return VirtualBenchParameters.model_validate(
+        {"sample_rate": rate, "filter_unit": {"cutoff": cutoff}, "shaker": {"band_high": 20.0}}
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +81,7 @@ class ShortRun:
 @cache
 def short_run(name: str) -> ShortRun:
     """Carry out the protocol on a simulated bench; raises AssertionError unless the run is completed."""
-    simulation = Simulation(bench=VirtualBenchParameters(sample_rate=1000.0))
+    simulation = Simulation(bench=_bench(name), seed=3)
     configuration = BenchConfiguration(simulation=simulation)
     protocol = load_protocol(name)
     prepared = protocol.prepare(PARAMETERS[name], configuration, None)

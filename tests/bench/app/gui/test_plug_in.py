@@ -61,9 +61,15 @@ def test_its_form_its_run_and_its_live_number(window: Window, qtbot: QtBot, tmp_
     assert window.pages.currentWidget() is run
     assert window.header.word.text() == "RUNNING"
     shown, predicted, _difference = run.verdict.sentence.split(" · ")
+    (plot,) = run.live.shown
+    # it is drawn at the next tick after its message
+    qtbot.waitUntil(lambda: not plot.figure.notice, timeout=LONG_MS)
+    expected, drawn = plot.figure.curves
     qtbot.waitUntil(lambda: window.pages.currentWidget() is window.results, timeout=LONG_MS)
     summary = json.loads((tmp_path / "run" / "summary.json").read_text(encoding="utf-8"))
     (point,) = summary["points"]
     gain = measurement(point["gain_m_s2_v"], point["gain_uncertainty"], "m/s²/V")
     assert shown == f"gain of the table  {gain}"
+    assert (drawn.name, drawn.x.tolist(), drawn.y.tolist()) == ("measured", [40.0], [point["gain_m_s2_v"]])
+    assert (expected.name, plot.figure.x_label, plot.figure.y_label) == ("predicted", "ω [rad/s]", "gain [m/s²/V]")
     assert predicted.startswith("predicted ")

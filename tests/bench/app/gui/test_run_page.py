@@ -301,10 +301,12 @@ def test_a_protocol_without_a_gain_shows_its_fits_instead_of_an_empty_gain_plot(
     window: Window, link: ScriptedClient
 ) -> None:
     run = window.run
+    window.pages.setCurrentWidget(run)
     link.said = [Ended("completed", "the plan was carried out", {}, "", Path("never"))]
     window._controller._look()
     window._controller.start(replace(order(Path("never")), protocol="free-vibration"))
-    assert run.shown_plot.isHidden()
+    assert run.gains.isHidden()
+    assert [plot.figure.curves for plot in run.live.shown] == [(), ()]
     assert "gain" not in run.verdict.sentence
     time = np.linspace(0.0, 1.0, 100)
     columns = {
@@ -317,17 +319,17 @@ def test_a_protocol_without_a_gain_shows_its_fits_instead_of_an_empty_gain_plot(
     fit = FitFinished("pluck 1", "k1 = 1 +- 0.1", columns, {"k1": FittedParameter(1234.5, 1.5, "N/m")})
     ScriptedClient.latest.said = [Published(fit)]
     window._controller._look()
-    assert not run.shown_plot.isHidden()
-    assert run.shown_plot.currentWidget() is run.live
-    assert run.live.drawn == ["laser 1", "laser 1 fitted"]
-    curve = run.live.getPlotItem().listDataItems()[0]
+    run._draw()
+    decay, _ = run.live.shown
+    assert [curve.name for curve in decay.figure.curves] == ["laser 1", "laser 1 fitted"]
+    curve = decay.plot.getPlotItem().listDataItems()[0]
     assert curve.getData()[1].max() == pytest.approx(1.0), "in mm"
     assert "(1234.5 ± 3.0) N/m" in run.verdict.sentence
     assert "±" in run.point.text()
     window._controller._take(Ended("completed", "", {}, "", Path("never")))
     window._controller.start(replace(order(Path("never")), protocol="harmonic", parameters=HarmonicParameters()))
-    assert run.shown_plot.currentWidget() is run.gains
-    assert run.live.drawn == []
+    assert not run.gains.isHidden()
+    assert run.live.shown == []
 
 
 def test_combinations_that_were_left_out_are_in_the_log_with_the_reason(window: Window, link: ScriptedClient) -> None:
