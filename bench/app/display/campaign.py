@@ -9,6 +9,7 @@ from typing import Any
 from bench.app.display import texts
 from bench.app.formatting import number
 from bench.app.ipc.messages import Run
+from bench.datafile.tables import Table
 from bench.events import Event, PointFinished
 from bench.live_values import Estimate, RunningGain
 from bench.protocol import Axis, Protocol
@@ -32,10 +33,19 @@ class Campaign:
         self._axes = protocol.view.matrix
         self._headline = protocol.view.headline
         self.rows, self.columns = ([], []) if self._axes is None else (self._values(axis, run) for axis in self._axes)
-        self.cells: dict[Place, Cell] = {
-            (i, j): Cell() for i in range(len(self.rows)) for j in range(len(self.columns))
-        }
+        self.cells: dict[Place, Cell] = {}
         self.current: Place | None = None
+        self.name_points({})
+
+    def name_points(self, prediction: Table) -> None:
+        """Use the names of the prediction on an axis of texts, in the same order: a record is called otherwise in the
+        results than in the parameter, which may refer to a file or be empty.
+        """
+        for axis, values in zip(self._axes or (), (self.rows, self.columns), strict=False):
+            column = prediction.get(axis.field)
+            if column is not None and column.values.dtype.kind == "U":
+                values[:] = list(dict.fromkeys(column.values.tolist()))
+        self.cells = {(i, j): Cell() for i in range(len(self.rows)) for j in range(len(self.columns))}
 
     @property
     def waiting(self) -> list[Place]:

@@ -23,10 +23,11 @@ def live_view(protocol: Protocol[Any], run: LiveRun) -> LiveView:
     """
     try:
         with plugin_code(f"the live view of {protocol.name}"):
-            parts = tuple((protocol.view.live or standard_view)(run))
-            if strange := [part for part in parts if not isinstance(part, Panel | GainCurve | Checklist)]:
-                raise TypeError(f"{type(strange[0]).__name__} is no part of a live view")
-            return parts
+            parts: tuple[object, ...] = tuple((protocol.view.live or standard_view)(run))
+            known = [part for part in parts if isinstance(part, Panel | GainCurve | Checklist)]
+            if len(known) < len(parts):
+                raise TypeError("a part of the live view is no Panel, GainCurve or Checklist")
+            return known
     except RockbenchError as error:
         return (Panel("", awaits=texts.LIVE_FAILED.format(error=error)),)
 

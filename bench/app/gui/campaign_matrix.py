@@ -11,8 +11,9 @@ from bench.app.display import texts
 from bench.app.display.campaign import Campaign
 from bench.app.display.theme import Theme
 from bench.app.ipc.messages import Run
+from bench.datafile.tables import Table
 from bench.events import Event, PointFinished
-from bench.protocol import Protocol
+from bench.protocol import Axis, Protocol
 
 
 class MatrixView(QTableWidget):
@@ -22,7 +23,7 @@ class MatrixView(QTableWidget):
         super().__init__()
         self._theme = theme
         self.campaign: Campaign | None = None
-        self._protocol: Protocol[Any] | None = None
+        self._axes: tuple[Axis, Axis] | None = None
         self.setAccessibleName(texts.NAMES["matrix"])
         self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
         self.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
@@ -37,10 +38,15 @@ class MatrixView(QTableWidget):
 
     def begin(self, protocol: Protocol[Any], run: Run) -> None:
         """Show the points of a new run."""
-        campaign = self.campaign = Campaign(protocol, run)
-        axes = protocol.view.matrix
-        self.setVisible(axes is not None)
-        if axes is not None:
+        self.campaign, self._axes = Campaign(protocol, run), protocol.view.matrix
+        self.setVisible(self._axes is not None)
+        self.open({})
+
+    def open(self, prediction: Table) -> None:
+        """Show the points by the names that they have in the prediction of the run."""
+        campaign, axes = self.campaign, self._axes
+        if campaign is not None and axes is not None:
+            campaign.name_points(prediction)
             self.setRowCount(len(campaign.rows))
             self.setColumnCount(len(campaign.columns))
             self.setVerticalHeaderLabels([axes[0].text(value) for value in campaign.rows])

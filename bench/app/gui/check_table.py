@@ -70,5 +70,4 @@ class CheckTable(QWidget):
                     item.setForeground(QColor(str(getattr(self._theme, level))))
                 self.table.setItem(row, place, item)
             last = last if check.verdict == "pending" else row
-        if checks:
-            self.table.scrollToItem(self.table.item(last, 0))
+        self.table.scrollTo(self.table.model().index(last, 0))

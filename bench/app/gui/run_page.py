@@ -162,6 +162,7 @@ class RunPage(QWidget):
         if self._controller.session.attached is not None:
             self.live.predict(opened.prediction)
         self.live.open(opened.prediction)
+        self.matrix.open(opened.prediction)
 
     def _trace(self, traces: list[Traces]) -> None:
         self.traces.add(traces)

@@ -136,6 +136,8 @@ class RunRecord:
         self.further = opened.further
         self.ring = Ring(len(TRACES) + len(opened.further))
         self.lines, self.kind = lines_of(opened.prediction), kind_of(opened.prediction)
+        if self.campaign is not None:
+            self.campaign.name_points(opened.prediction)
         if self.live is not None:
             self.live.prediction = opened.prediction
         if self.state.run is not None:

@@ -247,6 +247,10 @@ def _record(page: RunPage, run: ShortRun) -> None:
     error = np.sqrt(np.mean((achieved.y - wanted.y) ** 2) / np.mean(wanted.y**2))
     assert error < 0.2, "a table that follows its record"
     assert len(page.gains.measured) == len(_points(run))
+    (point,) = _points(run)
+    cell = page.matrix.item(0, 0)
+    assert cell is not None
+    assert f"{point['alpha_2']:.4g}"[:5] in cell.text(), "the record has another name in the results than as parameter"
 
 
 def _gains(page: RunPage, run: ShortRun) -> None:

@@ -301,10 +301,10 @@ def test_a_protocol_without_a_gain_shows_its_fits_instead_of_an_empty_gain_plot(
     window: Window, link: ScriptedClient
 ) -> None:
     run = window.run
-    window.pages.setCurrentWidget(run)
     link.said = [Ended("completed", "the plan was carried out", {}, "", Path("never"))]
     window._controller._look()
     window._controller.start(replace(order(Path("never")), protocol="free-vibration"))
+    window.pages.setCurrentWidget(run)
     assert run.gains.isHidden()
     assert [plot.figure.curves for plot in run.live.shown] == [(), ()]
     assert "gain" not in run.verdict.sentence
