@@ -180,8 +180,9 @@ def test_a_fall_is_told_to_the_caller_who_stands_the_block_up(model: TableModel,
     in_ramp = when == "in the ramp"
     first = played(0.9 * target.acceleration)
     second = played(0.95 * target.acceleration) if in_ramp else Fallen(np.zeros((100, 6)))
-    outcomes: list[Outcome] = [Done(), Done(), first, Done(), Done(), Done(), Done(), second]
-    outcomes += [Fallen(), Done()] if in_ramp else [Done()]
+    # after a pass, the motion of the table and the pass are published
+    outcomes: list[Outcome] = [Done(), Done(), first, Done(), Done(), Done(), Done(), Done(), second]
+    outcomes += [Fallen(), Done(), Done()] if in_ramp else [Done()]
     ended: list[Replicated] = []
 
     def plan() -> Plan:

@@ -34,7 +34,7 @@ PARAMETERS: dict[str, Parameters] = {
     "check": CheckParameters(cycles=4, rest=0.5),
     "laser-calibration": LaserCalibrationParameters(passes=6, cycles=4),
     "identify": IdentifyParameters(period=2.0, realisations=2, periods=2, discarded=1),
-    "free-vibration": FreeVibrationParameters(repeats=2, window=5.0),
+    "free-vibration": FreeVibrationParameters(repeats=1, window=5.0),
     "coupling-stiffness": CouplingStiffnessParameters(beta=(0.4,), repeats=1, window=5.0),
     "free-rocking": FreeRockingParameters(tilts=(0.35,)),
     "harmonic": HarmonicParameters(
@@ -47,7 +47,7 @@ PARAMETERS: dict[str, Parameters] = {
         harmonics=1,
         distortion_tolerance=0.1,
     ),
-    "earthquake": EarthquakeParameters(records=("synthetic:kobe",), beta=(0.97,), draws=40, passes=2, longest=8.0),
+    "earthquake": EarthquakeParameters(records=("synthetic:kobe",), beta=(0.97,), draws=40, passes=1, longest=5.0),
     "stability": StabilityParameters(omega=(15.3,), released_cycles=24, bisect=False, starts=1),
 }
 
