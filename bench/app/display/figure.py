@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from bench.app.display import texts
 from bench.app.display.typography import in_screen_unit, label, typeset
-from bench.live_view import Checklist, GainCurve, LiveRun, LiveView, Panel, Style, standard_view
+from bench.live_view import LiveRun, LiveView, Panel, Style, standard_view
 from bench.plugins import plugin_code
 from bench.protocol import Protocol
 from sim.errors import RockbenchError
@@ -23,11 +23,7 @@ def live_view(protocol: Protocol[Any], run: LiveRun) -> LiveView:
     """
     try:
         with plugin_code(f"the live view of {protocol.name}"):
-            parts: tuple[object, ...] = tuple((protocol.view.live or standard_view)(run))
-            known = [part for part in parts if isinstance(part, Panel | GainCurve | Checklist)]
-            if len(known) < len(parts):
-                raise TypeError("a part of the live view is no Panel, GainCurve or Checklist")
-            return known
+            return tuple((protocol.view.live or standard_view)(run))
     except RockbenchError as error:
         return (Panel("", awaits=texts.LIVE_FAILED.format(error=error)),)
 

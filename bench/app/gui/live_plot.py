@@ -35,11 +35,10 @@ class LivePlot(QWidget):
         self.figure = Figure("", "", "", (), "")
         """What is drawn."""
         self.heading = QLabel(wordWrap=True, textFormat=Qt.TextFormat.RichText)
-        self.plot = pg.PlotWidget()
+        self.plot = pg.PlotWidget(enableMenu=False)
         self.plot.setAccessibleName(texts.NAMES["live"])
         self._item: Any = self.plot.getPlotItem()
         self._item.showGrid(x=True, y=True, alpha=0.25)
-        self._item.setMenuEnabled(False)
         self._item.hideButtons()
         self.notice = QLabel(wordWrap=True, alignment=Qt.AlignmentFlag.AlignCenter, textFormat=Qt.TextFormat.RichText)
         self.notice.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
