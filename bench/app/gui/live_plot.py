@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QGridLayout, QLabel, QWidget
 
 from bench.app.display import texts
 from bench.app.display.figure import Curve, Figure, figure_of
@@ -42,14 +42,15 @@ class LivePlot(QWidget):
         self._item.hideButtons()
         self.notice = QLabel(wordWrap=True, alignment=Qt.AlignmentFlag.AlignCenter, textFormat=Qt.TextFormat.RichText)
         self.notice.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
-        over = QVBoxLayout(self.plot)
-        over.setContentsMargins(*INSIDE)
-        over.addWidget(self.notice)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(0)
-        column.addWidget(self.heading)
-        column.addWidget(self.plot, 1)
+        self.notice.setContentsMargins(*INSIDE)
+        grid = QGridLayout(self)
+        grid.setContentsMargins(0, 0, 0, 0)
+        grid.setSpacing(0)
+        grid.setRowStretch(1, 1)
+        grid.addWidget(self.heading, 0, 0)
+        # the sentence lies over the plot
+        for part in (self.plot, self.notice):
+            grid.addWidget(part, 1, 0)
         self.use_theme(theme)
 
     def use_theme(self, theme: Theme) -> None:

@@ -1,5 +1,6 @@
 """The live view of the Run page: the parts that the protocol declares, side by side."""
 
+from math import inf
 from typing import Any
 
 from PySide6.QtCore import Qt
@@ -16,6 +17,10 @@ from bench.events import Event, PointFinished
 from bench.live_values import Estimate, RunningGain
 from bench.live_view import Checklist, GainCurve, LiveRun, Panel
 from bench.protocol import Protocol
+from drivers.clock import now
+
+INTERVAL = 0.5
+"""Shortest time between two drawings of the panels [s]; two panels take about a tenth of it."""
 
 
 class LiveViewArea(QWidget):
@@ -27,7 +32,7 @@ class LiveViewArea(QWidget):
         self._protocol: Protocol[Any] | None = None
         self._run: LiveRun | None = None
         self._running: Estimate | RunningGain | None = None
-        self._changed = False
+        self._changed, self._shown_at = False, -inf
         self.gains, self.checks = GainPlot(theme), CheckTable(theme)
         self.plots: list[LivePlot] = []
         """Plots of the panels, of which the first ones are in use."""
@@ -60,6 +65,7 @@ class LiveViewArea(QWidget):
         self._protocol, self._running = protocol, None
         self._run = LiveRun(protocol.point, run.parameters, run.configuration)
         self._show()
+        self._shown_at = -inf
 
     def open(self, prediction: Table) -> None:
         """Set the prediction of the run."""
@@ -77,15 +83,15 @@ class LiveViewArea(QWidget):
             self.gains.add(event.point.model_dump())
 
     def draw(self) -> None:
-        """Draw what has changed since the last call."""
+        """Draw what has changed since the last call; panels at most once in `INTERVAL`."""
         if self._running is not None and not self.gains.isHidden():
             self.gains.show_running(self._running)
             self._running = None
-        if self._changed:
+        if self._changed and now() - self._shown_at >= INTERVAL:
             self._show()
 
     def _show(self) -> None:
-        self._changed = False
+        self._changed, self._shown_at = False, now()
         if self._protocol is None or self._run is None:
             return
         view = live_view(self._protocol, self._run)

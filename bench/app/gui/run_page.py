@@ -171,14 +171,18 @@ class RunPage(QWidget):
         for block in traces:
             self.block.place(block)
         # immediately, not at the next tick
-        self._draw()
+        self._draw_motion()
 
     def _draw(self) -> None:
+        self._draw_motion()
+        if self.isVisible():
+            self.live.draw()
+
+    def _draw_motion(self) -> None:
         if not self.isVisible():
             return
         shown = self.tabs.currentWidget()
         self.traces.draw()
-        self.live.draw()
         if isinstance(shown, MotionPlot):
             shown.draw(self.traces.ring)
         moment = self.block.nearest(self.traces.moment)
