@@ -13,27 +13,41 @@ _SYMBOLS = {
     "alpha_1": "α₁",
     "alpha_2": "α₂",
     "beta": "β",
+    "k1": "k₁",
+    "k2": "k₂",
     "lambda": "λ",
     "omega": "Ω",
+    "r_exp": "rₑₓₚ",
+    "r_th": "rₜₕ",
     "theta": "ϑ",
     "u1": "u₁",
     "u2": "u₂",
+    "xi1": "ξ₁",
+    "xi2": "ξ₂",
 }
 _WORDS = re.compile(rf"(?<![\w.`-])({'|'.join(_SYMBOLS)})(?![\w:`]|\.\w)")
 """Stand-alone symbols, which are not part of a key, flag or file name."""
 
-_UNIT = re.compile(r"(?:(?<=/s)2|(?<=/m)[23]|(?<=kg m)2)(?!\w|\.\d)")
+_UNIT = re.compile(r"(?:(?<=/s)2|(?<=/m)[23]|(?<=kg m)2|(?<= s)2(?=/))(?!\w|\.\d)")
 """Powers within a unit; m2 alone is excluded because it may be a mass."""
 
+_ROOT = re.compile(r"\bsqrt\((\w+)\)")
 _POWER = re.compile(r"(?<=[a-z])([23])(?!\d)")
+_RAISING = re.compile(r"(?<=\w)\^([23])(?!\d)")
 _RAISED = {"2": "²", "3": "³"}
 _DIGITS = str.maketrans("0123456789-−", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻⁻")
 
 _DETAIL = (" (", "; ", ": ")
 """Separators between the first words of a description and its details."""
 
-_NAME = re.compile(r"(?<=[a-z]{4})_(?=[a-z]{3})")
-"""Underscores in names of parameters within a description, such as heating_time, but not in h_b."""
+_NAME = re.compile(r"(?<![\w.`/\\'\"-])(?![a-z]_[a-z]{1,2}\b)[a-z][a-z0-9]*(?:_[a-z0-9]+)+(?![\w`/\\'\"=-]|\.\w)")
+"""Names of channels, parameters and fields within a text, such as laser_1, but not h_b, a key or a file."""
+
+_SUFFIX = re.compile(r"_(?:rad_s|rad|n_m|m_s2|hz)$")
+"""Units at the end of the name of a field."""
+
+_SMALL = re.compile(r"(?<=\d )u(?=[ms](?:\W|$))")
+"""The prefix of micrometres and microseconds."""
 
 
 def plain(value: float | None, digits: int = 4) -> str:
@@ -80,10 +94,22 @@ def without_unit(name: str, unit: str) -> str:
 
 
 def typeset(text: str) -> str:
-    """A line of a journal or a summary with typeset symbols, units and signs: α₂, Ω, m/s², ±."""
+    """A line of a journal or a summary with typeset symbols, units and signs: α₂, Ω, m/s², ±. Names of channels and
+    parameters are words: laser 1.
+    """
     text = _WORDS.sub(lambda found: _SYMBOLS[found[1]], text.replace("+-", "±"))
-    text = re.sub(r"(?<=\d)%", " %", text)
+    text = _SMALL.sub("µ", _NAME.sub(lambda found: _printed(found[0]), text))
+    text = re.sub(r"(?<=\d)%", " %", text).replace("Hz^0.5", "√Hz")
+    text = _ROOT.sub(lambda found: f"√{found[1]}", text)
+    text = _RAISING.sub(lambda found: _RAISED[found[1]], text)
     return _UNIT.sub(lambda found: _RAISED[found[0]], text)
+
+
+def _printed(name: str) -> str:
+    """A name as words, without its unit, with its symbol: α₂ low for `alpha_2_low`."""
+    words = _SUFFIX.sub("", name)
+    symbol = next((each for each in _SYMBOLS if words == each or words.startswith(f"{each}_")), "")
+    return _SYMBOLS.get(symbol, "") + words[len(symbol) :].replace("_", " ")
 
 
 def moment(iso: str) -> str:
@@ -111,4 +137,4 @@ def listed(items: list[str]) -> str:
 def first_words(description: str) -> str:
     """First words of the description of a parameter, without its details."""
     ends = [at for mark in _DETAIL if (at := description.find(mark)) > 0]
-    return typeset(_NAME.sub(" ", description[: min(ends, default=len(description))]))
+    return typeset(description[: min(ends, default=len(description))])

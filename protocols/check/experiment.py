@@ -19,6 +19,7 @@ from bench.analysis.signals import ACCELERATION, DISPLACEMENT, LASER_1, LASER_2,
 from bench.config.model import BenchConfiguration
 from bench.control.oscillator import Segment
 from bench.datafile.tables import Column, Table
+from bench.document.typography import typeset
 from bench.engine.steps import (
     AcquireAtRest,
     Arm,
@@ -239,7 +240,7 @@ def _margins(lines: Sequence[CheckLine]) -> "Figure":
     for row, (line, position) in enumerate(judged):
         passed = line.verdict is Verdict.PASSED
         panel.plot(position, row, "o" if passed else "X", color=BLUE if passed else VERMILLION, markersize=6)
-    labels = [f"{line.subject}: {line.what}" for line, _ in judged]
+    labels = [typeset(f"{line.subject}: {line.what}") for line, _ in judged]
     panel.set_yticks(range(len(judged)), labels, fontsize=7)
     panel.set_xlim(-1.1 * _OUTSIDE, 1.1 * _OUTSIDE)
     panel.set_xticks([-1.0, 0.0, 1.0], ["lowest", "middle", "highest"])

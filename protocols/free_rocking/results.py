@@ -217,8 +217,8 @@ def _result_text(row: Mapping[str, Any]) -> str:
         "amplitudes are used as a check."
     )
     return (
-        f"r_exp / r_th = {ratio}, from {row['impacts']} impacts of the stand-alone block on a table clamped to the"
-        f" ground, with r_th = {theory} from the block's sides. Uncertainties are expanded (k = 2). {by}"
+        f"rₑₓₚ / rₜₕ = {ratio}, from {row['impacts']} impacts of the stand-alone block on a table clamped to the"
+        f" ground, with rₜₕ = {theory} from the block's sides. Uncertainties are expanded (k = 2). {by}"
     )
 
 

@@ -1,5 +1,6 @@
 """The command `rockbench` and the data of its first edition, reached as a user reaches them: no module is imported."""
 
+import lzma
 import re
 import signal
 import sys
@@ -14,6 +15,15 @@ from pathlib import Path
 import pytest
 
 DATA = Path(__file__).parents[1] / "data" / "first_edition"
+
+
+def unpack(name: str, folder: Path) -> Path:
+    """The data file of this name in `folder`, which is unpacked there once."""
+    path = folder / f"{name}.h5"
+    if not path.exists():
+        path.write_bytes(lzma.decompress((DATA / f"{name}.h5.xz").read_bytes()))
+    return path
+
 
 EXCEPTED = {"elapsed_s", "software", "plan_hash", "file", "figure", "further_figures"}
 """What holds a time, a version, a hash over both and over every key of the configuration, or a path."""

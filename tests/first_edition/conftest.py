@@ -1,7 +1,6 @@
 """What the tests on the first edition share."""
 
 import json
-import lzma
 import platform
 from collections.abc import Callable
 from pathlib import Path
@@ -9,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.first_edition.command import DATA, Rockbench, command
+from tests.first_edition.command import DATA, Rockbench, command, unpack
 
 
 @pytest.fixture(scope="session")
@@ -30,11 +29,4 @@ def same_arithmetic() -> bool:
 def unpacked(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
     """Unpacks a data file by name, once for each module of tests."""
     folder = tmp_path_factory.mktemp("first_edition")
-
-    def unpack(name: str) -> Path:
-        path = folder / f"{name}.h5"
-        if not path.exists():
-            path.write_bytes(lzma.decompress((DATA / f"{name}.h5.xz").read_bytes()))
-        return path
-
-    return unpack
+    return lambda name: unpack(name, folder)

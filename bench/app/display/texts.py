@@ -136,7 +136,7 @@ NO_CHANGE = "< 0.01 %"
 SENSORS = ("table acceler.", "table displ.", "laser 1", "laser 2")
 STEADY_TIP = (
     "For each sensor, the mean cycles of two windows of {window} cycles are compared; steady means that they agree "
-    "within a third of {tolerance:g} % (settle_tolerance). Computed from the traces; the run evaluates the samples."
+    "within a third of {tolerance:g} % (settle tolerance). Computed from the traces; the run evaluates the samples."
 )
 LOST_PARTS, AND = ("{n} events", "{n} blocks of traces"), " and "
 LOST = "{what} were not shown; the file contains all of them."

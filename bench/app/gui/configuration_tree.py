@@ -85,9 +85,9 @@ def _line(of: Declared, value: object) -> QTreeWidgetItem:
     else:
         item.setText(1, _words(value))
         item.setText(2, "" if of.unit == "1" or value is None else unit_text(of.unit))
-        tip = f"{of.description}\n{texts.MUST_BE.format(allowed=typeset(of.allowed_in_unit))}"
+        tip = f"{of.description}\n{texts.MUST_BE.format(allowed=of.allowed_in_unit)}"
     for column in range(3):
-        item.setToolTip(column, tip[:1].upper() + tip[1:])
+        item.setToolTip(column, typeset(tip[:1].upper() + tip[1:]))
     item.setData(0, Qt.ItemDataRole.UserRole, changed)
     font = item.font(1)
     font.setBold(changed)

@@ -52,7 +52,7 @@ class Form(QWidget):
     def _line(self, entry: Declared, value: Any) -> QWidget:
         field = _field(entry, value)
         field.setToolTip(_tip(entry))
-        field.setAccessibleName(f"{entry.name} {entry.unit}".strip())
+        field.setAccessibleName(_name(entry))
         self.fields[entry.name], self.errors[entry.name] = field, QLabel(wordWrap=True)
         self.errors[entry.name].hide()
         changed = (
@@ -135,7 +135,7 @@ def _name(entry: Declared) -> str:
 def _tip(entry: Declared) -> str:
     """Description, limits and default."""
     lines = [
-        f"{entry.description[:1].upper()}{entry.description[1:]}.",
+        f"{typeset(entry.description[:1].upper() + entry.description[1:])}.",
         texts.MUST_BE.format(allowed=typeset(entry.allowed_in_unit)),
     ]
     default = _typed(entry, entry.default)

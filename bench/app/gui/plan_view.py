@@ -99,7 +99,7 @@ def _left(each: Margin) -> float:
 
 def _tip(each: Margin) -> str:
     if each.margin is None or each.likely is None:
-        return each.demand.where
+        return typeset(each.demand.where)
     return texts.MARGIN_TIP.format(margin=100.0 * each.margin, likely=100.0 * each.likely)
 
 

@@ -11,6 +11,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QComboBox, QHBoxLayout, QPushButton, QScrollArea, QSplitter, QVBoxLayout, QWidget
 
 from bench.app.display import texts
+from bench.app.display.typography import typeset
 from bench.app.folders import check_folder, default_folder, make_folder, remove_unused, result_names
 from bench.app.gui.controller import Controller
 from bench.app.gui.form import Form, RunOptions
@@ -188,7 +189,7 @@ class ProtocolPage(QWidget):
 
     def _choose(self, index: int) -> None:
         entry = self._entries[index]
-        self.choice.setToolTip(f"{entry.summary}\n{entry.details}")
+        self.choice.setToolTip(typeset(f"{entry.summary}\n{entry.details}"))
         values = self._first_values if entry.name == "harmonic" else None
         self._show_form(self._forms.get(entry.name) or Form(entry.parameters, values))
 

@@ -241,6 +241,6 @@ def _plain(default: object) -> object:
 def _parameter_text(of: Declared, value: object) -> str:
     """A parameter with value and unit, as typed in the form."""
     values = cast(list[object], value) if isinstance(value, list) else [value]
-    text = " ".join(as_typed(each) for each in values)
-    unit = "" if of.unit in ("", "1") else f" {unit_text(of.unit)}"
+    text = " ".join(as_typed(each) for each in values if each is not None) or texts.NO_VALUE
+    unit = "" if of.unit in ("", "1") or text == texts.NO_VALUE else f" {unit_text(of.unit)}"
     return f"{label(of.name)} {text}{unit}"

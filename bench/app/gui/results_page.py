@@ -61,7 +61,7 @@ def show_points(
     """
     if everything:
         headings, rows = every_field(results, points)
-        _fill(table, headings, [of.description for of in results.values()], rows)
+        _fill(table, headings, [typeset(of.description) for of in results.values()], rows)
     else:
         _fill(table, texts.POINT_TITLES, texts.POINT_TIPS, [each.cells for each in rows_of(results, points, labels)])
     header = table.horizontalHeader()

@@ -80,7 +80,7 @@ def fits_section(campaign: Campaign) -> Section | None:
         parts.append(
             Picture(
                 fit_figure(fit),
-                f"Fit {fit.name}. {meanings}.",
+                f"Fit {typeset(fit.name)}. {meanings}.",
                 "Measured and fitted values against the axis of the fit.",
             )
         )
@@ -93,7 +93,7 @@ def _parameters(fit: FitFinished) -> Table:
         [_words(name), with_uncertainty(found.value, COVERAGE * found.uncertainty), unit_text(found.unit)]
         for name, found in fit.parameters.items()
     ]
-    return Table(f"Results of the fit {fit.name} (expanded uncertainties, k = 2)", columns, rows)
+    return Table(f"Results of the fit {typeset(fit.name)} (expanded uncertainties, k = 2)", columns, rows)
 
 
 def _words(name: str) -> str:

@@ -24,7 +24,7 @@ SYMBOLS = {
     "xi1": "ξ₁",
     "xi2": "ξ₂",
     "rho": "ρ",
-    "restitution_factor": "r/r_th",
+    "restitution_factor": "r/rₜₕ",
 }
 """Symbols of parameters that differ from their names."""
 

@@ -7,9 +7,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from bench.app.catalogue import load_protocol
 from bench.app.cli.main import main
+from bench.app.reports.report import campaign_report
 from bench.datafile.reader import open_datafile
+from bench.document.campaign import Campaign
 from protocols.common.sine.holding import HoldCycle
+from tests.visible_text import document_texts, faults
 
 pytestmark = pytest.mark.usefixtures("shared_results")
 
@@ -66,6 +70,10 @@ def test_report_and_replay(
     text = page.read_text(encoding="utf-8")
     assert "Stability of the rocking orbits" in text
     assert f"{unstable['modulus']:.3f}" in text
+    with open_datafile(folder / "campaign.h5") as record:
+        protocol = load_protocol("stability")
+        document = campaign_report(Campaign(page, record, protocol.parameters), protocol)
+        assert not faults(document_texts(document))
 
 
 @pytest.mark.soak

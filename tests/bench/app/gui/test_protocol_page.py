@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QApplication, QLabel, QLineEdit, QTableWidgetItem,
 from pytestqt.qtbot import QtBot
 
 from bench.app.display import texts
+from bench.app.display.typography import typeset
 from bench.app.gui.form import Form
 from bench.app.gui.window import Window
 from bench.app.ipc.messages import PlanChecked, Refused, Run
@@ -40,8 +41,8 @@ def test_an_untouched_form_is_the_defaults(entry: Protocol[Any], qtbot: QtBot) -
     assert list(form.fields) == [each.name for each in values]
     for each in values:
         tip = form.fields[each.name].toolTip()
-        assert each.description[1:] in tip
-        assert each.allowed in tip
+        assert typeset(each.description)[1:] in tip
+        assert typeset(each.allowed) in tip
     try:
         expected = entry.parameters()
     except ValueError:
