@@ -273,6 +273,23 @@ CHECK_TABLE_TIP = "The tooltip of a failed line gives the remedy."
 ASK_CHECK_TIP = "The frame is clamped and unclamped by hand, so on this bench the check always asks."
 CHECK_TITLES = ("verdict", "signal", "quantity", "measured", "U (k = 2)", "allowed")
 
+DEFAULTS, DEFAULTS_TIP = "Defaults", "Fills the form with the defaults of the protocol."
+LAST_VALUES = "Last values"
+LAST_VALUES_TIP = (
+    "Fills the form with the values of the last checked plan of this protocol, also of an earlier session."
+)
+LAST_VALUES_NONE = "No plan of this protocol has been checked yet."
+LAST_VALUES_SHOWN = "Values of the last checked plan."
+PRESET, PRESET_HINT = "Presets", "preset: select or name"
+PRESET_TIP = "Select a preset to fill the form with it, or type a name to save the values of the form."
+PRESET_SAVE, PRESET_SAVE_TIP = "Save", "Saves the values of the form as the named preset, which it replaces."
+PRESET_DELETE, PRESET_DELETE_TIP = "Delete", "Deletes the file of the named preset; the form keeps its values."
+PRESET_LOADED, PRESET_SAVED, PRESET_DELETED = "Preset {name}.", "Saved: {path}", "Deleted: {name}"
+PRESET_NO_NAME, PRESET_NONE = "type a name first", "there is no preset with this name"
+PRESET_INVALID = "Invalid values are marked in the form."
+PRESET_UNKNOWN = "Not in this protocol: {values}."
+RECENT, RECENT_TIP = "Recent configurations", "Opens a configuration that was used before."
+
 ADD, ADD_TIP = "Add to queue", "Appends the checked plan to the queue (Ctrl+J)."
 SAVE, SAVE_TIP = "Save in queue", "Replaces test {number} of the queue by the checked plan (Ctrl+J)."
 LEAVE, LEAVE_TIP = "Discard changes", "Ends editing; the test in the queue stays unchanged (Esc)."

@@ -1,11 +1,11 @@
 """Forms generated from the declared parameters of a protocol, and the options of a run."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QCheckBox, QComboBox, QFormLayout, QLabel, QLineEdit, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QCheckBox, QComboBox, QFormLayout, QHBoxLayout, QLabel, QLineEdit, QVBoxLayout, QWidget
 
 from bench.app.display import texts
 from bench.app.display.typography import label, typeset
@@ -15,7 +15,7 @@ from bench.app.ipc.messages import PlanCheck, Run
 from bench.app.queue.queue import Queued
 from bench.config.declared import Declared, declared
 from bench.config.model import BenchConfiguration
-from bench.config.validation import problems, read_fields, validated
+from bench.config.validation import problems, read_fields, validated, with_present_names
 from bench.document.typography import unit_text
 from sim.parameters import Parameters
 
@@ -32,12 +32,15 @@ class Form(QWidget):
     def __init__(self, model: type[Parameters], values: Mapping[str, Any] | None = None) -> None:
         super().__init__()
         self._model = model
+        values = with_present_names(model, values or {})
+        self.unknown = {name: value for name, value in values.items() if name not in model.model_fields}
+        """Given values that the protocol has no parameter for."""
         self.fields: dict[str, Field] = {}
         self.errors: dict[str, QLabel] = {}
         layout = QFormLayout(self)
         for entry in declared(model):
             if entry.group is None:
-                layout.addRow(_name(entry), self._line(entry, (values or {}).get(entry.name, entry.default)))
+                layout.addRow(_name(entry), self._line(entry, values.get(entry.name, entry.default)))
         self._check()
 
     def parameters(self) -> Parameters:
@@ -84,25 +87,28 @@ class Form(QWidget):
             error.setText(f"▲ {found.get(name, '')}")
             set_level(error, "alarm")
 
-    def _data(self) -> dict[str, Any]:
-        """Plain data as in a file; empty fields are omitted."""
-        typed: dict[str, Any] = {}
+    def typed(self) -> dict[str, str | bool | list[str]]:
+        """The values as typed; empty fields are omitted."""
+        typed: dict[str, str | bool | list[str]] = {}
         for entry in declared(self._model):
             field = self.fields.get(entry.name)
             if isinstance(field, QCheckBox):
                 typed[entry.name] = field.isChecked()
             elif isinstance(field, QComboBox):
-                typed[entry.name] = field.currentText() or None
+                if field.currentText():
+                    typed[entry.name] = field.currentText()
             elif isinstance(field, QLineEdit) and (text := field.text().strip()):
-                typed[entry.name] = _parts(entry, text) if entry.many else text
-        return read_fields(self._model, typed)
+                typed[entry.name] = _parts(text) if entry.many and entry.kind is str else text
+        return typed
+
+    def _data(self) -> dict[str, Any]:
+        """Plain data as in a file; empty fields are omitted."""
+        return read_fields(self._model, self.typed())
 
 
-def _parts(entry: Declared, text: str) -> list[str]:
-    """Split the text of a list: strings, which may contain spaces, at semicolons; numbers at spaces, as on the command
-    line.
-    """
-    return [part.strip() for part in text.split(";") if part.strip()] if entry.kind is str else [text]
+def _parts(text: str) -> list[str]:
+    """Split the text of a list of strings, which may contain spaces, at semicolons."""
+    return [part.strip() for part in text.split(";") if part.strip()]
 
 
 def _field(entry: Declared, value: Any) -> Field:
@@ -114,17 +120,32 @@ def _field(entry: Declared, value: Any) -> Field:
         choice = QComboBox()
         ignore_wheel(choice)
         choice.addItems([*([""] if entry.optional else []), *entry.choices])
-        choice.setCurrentText("" if value is None else str(getattr(value, "value", value)))
+        chosen = "" if _absent(value) else str(getattr(value, "value", value))
+        if chosen and choice.findText(chosen) < 0:
+            # shown with the reason why it is invalid
+            choice.addItem(chosen)
+        choice.setCurrentText(chosen)
         return choice
     return QLineEdit(_typed(entry, value))
 
 
 def _typed(entry: Declared, value: Any) -> str:
-    if value is None or type(value).__name__ == "PydanticUndefinedType":
+    if _absent(value):
         return ""
-    if entry.many:
-        return ("; " if entry.kind is str else " ").join(as_typed(each) for each in value)
-    return as_typed(value)
+    if isinstance(value, list | tuple):
+        values = cast(Sequence[object], value)
+        return ("; " if entry.kind is str else " ").join(map(_exactly, values))
+    return _exactly(value)
+
+
+def _absent(value: object) -> bool:
+    return value is None or type(value).__name__ == "PydanticUndefinedType"
+
+
+def _exactly(value: object) -> str:
+    """A value as typed, with as many digits as it has."""
+    text = as_typed(value)
+    return repr(value) if isinstance(value, float) and float(text) != value else text
 
 
 def _name(entry: Declared) -> str:
@@ -164,8 +185,12 @@ class RunOptions(QWidget):
             field.setToolTip(tip)
             field.setAccessibleName(name)
         column.addLayout(lines)
-        for box in (self.realtime, self.person, self.keep_going):
-            column.addWidget(box)
+        boxes = QHBoxLayout()
+        for box in (self.realtime, self.person):
+            boxes.addWidget(box)
+        boxes.addStretch(1)
+        column.addLayout(boxes)
+        column.addWidget(self.keep_going)
         self.realtime.setToolTip(texts.REALTIME_TIP)
         self.keep_going.setToolTip(texts.GO_ON_TIP)
         self.use(configuration)

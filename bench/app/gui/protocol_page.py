@@ -1,6 +1,6 @@
 """The Protocol page: parameter form, plan check, and start or queueing of a run."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from datetime import datetime
 from itertools import pairwise
@@ -16,6 +16,7 @@ from bench.app.folders import check_folder, default_folder, make_folder, remove_
 from bench.app.gui.controller import Controller
 from bench.app.gui.form import Form, RunOptions
 from bench.app.gui.plan_view import PlanView
+from bench.app.gui.preset_bar import PresetBar
 from bench.app.gui.widgets import FITTING, give_key, ignore_wheel, scrolling
 from bench.app.ipc.messages import PlanCheck, PlanChecked, Refused
 from bench.app.queue.queue import Queued, queued
@@ -37,7 +38,12 @@ class ProtocolPage(QWidget):
     """Emits the prediction of the run that is about to begin."""
 
     def __init__(
-        self, controller: Controller, configuration: BenchConfiguration, entries: Sequence[Protocol[Any]], tour: bool
+        self,
+        controller: Controller,
+        configuration: BenchConfiguration,
+        entries: Sequence[Protocol[Any]],
+        tour: bool,
+        presets: Path | None = None,
     ) -> None:
         super().__init__()
         self._controller, self._configuration, self._entries = controller, configuration, tuple(entries)
@@ -46,6 +52,8 @@ class ProtocolPage(QWidget):
         self._checking = self._began = False
         self._edited_test: Queued | None = None
         self._made: Path | None = None
+        # created first, so that the values follow the protocol in the tab order
+        self.presets = PresetBar(presets)
         self.choice = QComboBox()
         self.choice.addItems([entry.name for entry in entries])
         self.choice.setAccessibleName(texts.NAMES["protocol"])
@@ -65,6 +73,7 @@ class ProtocolPage(QWidget):
         self._arrange()
         self._choose(0)
         self.choice.currentIndexChanged.connect(self._choose)
+        self.presets.filled.connect(self._fill)
         self.folder.textChanged.connect(self._edited)
         for box in (self.realtime, self.person):
             box.toggled.connect(self.refresh)
@@ -190,8 +199,16 @@ class ProtocolPage(QWidget):
     def _choose(self, index: int) -> None:
         entry = self._entries[index]
         self.choice.setToolTip(typeset(f"{entry.summary}\n{entry.details}"))
-        values = self._first_values if entry.name == "harmonic" else None
-        self._show_form(self._forms.get(entry.name) or Form(entry.parameters, values))
+        form = self._forms.get(entry.name)
+        first = self._first_values if entry.name == "harmonic" else None
+        last = self.presets.last(entry) if form is None and first is None else None
+        self._show_form(form or Form(entry.parameters, first or last))
+        if last is not None:
+            self.presets.report(texts.LAST_VALUES_SHOWN)
+
+    def _fill(self, values: Mapping[str, Any]) -> None:
+        """Fill the form of the selected protocol with unvalidated values; a queued test that is edited stays that."""
+        self._show_form(Form(self.entry.parameters, values))
 
     def _show_form(self, form: Form) -> None:
         """Show the form of the selected protocol; the other forms keep their values."""
@@ -199,6 +216,7 @@ class ProtocolPage(QWidget):
         if former is not None:
             former.edited.disconnect(self._edited)
         self.form = self._forms[self.entry.name] = form
+        self.presets.use(self.entry, form)
         form.edited.connect(self._edited)
         self.form_area.setWidget(form)
         form.show()
@@ -221,6 +239,7 @@ class ProtocolPage(QWidget):
         if isinstance(found, PlanChecked):
             self._checked = found
             self.plan.show_plan(found)
+            self.presets.keep_last()
         else:
             self.plan.refuse(found.text)
         self.refresh()
@@ -250,7 +269,12 @@ class ProtocolPage(QWidget):
         self.leave.hide()
         left, right = QWidget(), QWidget()
         plan, found = QVBoxLayout(left), QVBoxLayout(right)
-        for part in (self.choice, self.form_area, self.options):
+        top = QHBoxLayout()
+        top.addWidget(self.choice, 1)
+        for button in (self.presets.last_values, self.presets.defaults):
+            top.addWidget(button)
+        plan.addLayout(top)
+        for part in (self.presets, self.form_area, self.options):
             plan.addWidget(part, int(part is self.form_area))
         found.addWidget(self.plan, 1)
         buttons = QHBoxLayout()

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import QSettings, Qt, Signal
 from PySide6.QtWidgets import (
     QComboBox,
     QHBoxLayout,
@@ -20,6 +20,7 @@ from bench.app.gui.background import Command
 from bench.app.gui.check_panel import CheckPanel
 from bench.app.gui.configuration_tree import ConfigurationTree
 from bench.app.gui.controller import Controller
+from bench.app.gui.recent_files import RecentFiles
 from bench.app.gui.widgets import FITTING, ask_for_files, give_key, ignore_wheel, scrolling, set_level, why_no_dialog
 from bench.config.model import BenchConfiguration
 from bench.config.result_files import read_specimen
@@ -96,7 +97,12 @@ class SetupPage(QWidget):
     """Emits the `BenchConfiguration` for the following runs."""
 
     def __init__(
-        self, controller: Controller, configuration: BenchConfiguration, path: Path | None, theme: Theme
+        self,
+        controller: Controller,
+        configuration: BenchConfiguration,
+        path: Path | None,
+        theme: Theme,
+        settings: QSettings | None = None,
     ) -> None:
         super().__init__()
         self._controller = controller
@@ -104,6 +110,7 @@ class SetupPage(QWidget):
         self._specimen: Path | None = None
         self.source = QLabel(wordWrap=True)
         self.open_file, self.open_specimen = QPushButton(texts.OPEN_CONFIGURATION), QPushButton(texts.OPEN_SPECIMEN)
+        self.recent = RecentFiles(settings)
         self.tree, self.devices = ConfigurationTree(), DevicesPanel(controller)
         self.loop = CheckPanel(controller, theme)
         self.theme = QComboBox()
@@ -115,6 +122,7 @@ class SetupPage(QWidget):
         self._arrange()
         self.open_file.clicked.connect(self._ask_configuration)
         self.open_specimen.clicked.connect(self._ask_specimen)
+        self.recent.chosen.connect(self.open_configuration)
         controller.changed.connect(self._refresh)
         self._show()
         self._refresh()
@@ -154,6 +162,8 @@ class SetupPage(QWidget):
         if self.path is not None:
             lines += former_keys(self.path)
         self._say("\n".join(lines), "calm")
+        if self.path is not None:
+            self.recent.add(self.path)
         self.tree.use(self.configuration)
         self.devices.use(self.configuration, self.path)
         self.loop.use(self.configuration)
@@ -178,6 +188,7 @@ class SetupPage(QWidget):
         ):
             button.setEnabled(not why)
             button.setToolTip(why or tip)
+        self.recent.hold(why)
 
     def _arrange(self) -> None:
         give_key(self.open_file, "Ctrl+Shift+O")
@@ -191,6 +202,7 @@ class SetupPage(QWidget):
         buttons.addWidget(self.open_file)
         buttons.addWidget(self.open_specimen)
         column.addLayout(buttons)
+        column.addWidget(self.recent)
         column.addWidget(self.tree, 1)
         colours = QHBoxLayout()
         colours.addWidget(QLabel(texts.THEME))

@@ -8,7 +8,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from PySide6.QtCore import QByteArray, QEvent, QObject, QSettings
+from PySide6.QtCore import QByteArray, QEvent, QObject, QSettings, QStandardPaths
 from PySide6.QtGui import QCloseEvent, QKeySequence, QResizeEvent, QShortcut
 from PySide6.QtWidgets import (
     QAbstractItemView,
@@ -88,8 +88,9 @@ FIRST = (1280, 800)
 
 
 class Window(QMainWindow):
-    """The operator's window. Every part is a client of `controller`. `settings` stores the layout and `queue` is the
-    file of the queue; either is not stored if None. With `tour`, the guided tour is shown.
+    """The operator's window. Every part is a client of `controller`. `settings` stores layout and recent files, `queue`
+    is the file of the queue, `presets` the folder of presets; what is None is not stored. With `tour`, the guided tour
+    is shown.
     """
 
     def __init__(
@@ -102,6 +103,7 @@ class Window(QMainWindow):
         path: Path | None = None,
         settings: QSettings | None = None,
         queue: Path | None = None,
+        presets: Path | None = None,
         tour: bool = False,
     ) -> None:
         super().__init__()
@@ -114,8 +116,8 @@ class Window(QMainWindow):
         self.header = Header(controller, theme, self.sessions.toggle)
         self.prompt, self.trouble = Prompt(controller), TroublePanel(controller)
         self.runner = self._runner(configuration, queue)
-        self.setup = SetupPage(controller, configuration, path, theme)
-        self.protocol = ProtocolPage(controller, configuration, entries, tour)
+        self.setup = SetupPage(controller, configuration, path, theme, settings)
+        self.protocol = ProtocolPage(controller, configuration, entries, tour, presets)
         # not in real time, so that the tour takes less than a minute
         self.protocol.realtime.setChecked(not tour)
         self.queue = QueuePage(controller, self.runner, entries)
@@ -248,8 +250,17 @@ def open_window(
     settings = QSettings()
     theme = chosen_theme(str(settings.value("theme", "")))
     controller = Controller()
+    kept = QStandardPaths.writableLocation(QStandardPaths.StandardLocation.AppConfigLocation)
     window = Window(
-        controller, configuration, entries, theme, path=path, settings=settings, queue=queue, tour=path is None
+        controller,
+        configuration,
+        entries,
+        theme,
+        path=path,
+        settings=settings,
+        queue=queue,
+        presets=Path(kept, "presets"),
+        tour=path is None,
     )
     # after the window is built, because in a styled application every insertion of a widget styles its children again
     dress(application, theme)

@@ -71,7 +71,7 @@ def main(width: int, height: int, theme: str) -> int:
     application = QApplication([])
     dress(application, THEMES[theme])
     controller = Controller()
-    window = Window(controller, BenchConfiguration(), all_protocols()[0], THEMES[theme])
+    window = Window(controller, BenchConfiguration(), all_protocols()[0], THEMES[theme], presets=Path("never"))
     scale = window.devicePixelRatioF()
     window.resize(max(int(width / scale), SMALLEST[0]), max(int(height / scale) - TITLE_BAR, SMALLEST[1]))
     window.show()
