@@ -288,6 +288,8 @@ PRESET_LOADED, PRESET_SAVED, PRESET_DELETED = "Preset {name}.", "Saved: {path}",
 PRESET_NO_NAME, PRESET_NONE = "type a name first", "there is no preset with this name"
 PRESET_INVALID = "Invalid values are marked in the form."
 PRESET_UNKNOWN = "Not in this protocol: {values}."
+SOUNDS = "Sounds"
+SOUNDS_TIP = "Beeps: one for a question, two for the end of a run, five for an abort. Kept for the next start."
 RECENT, RECENT_TIP = "Recent configurations", "Opens a configuration that was used before."
 
 ADD, ADD_TIP = "Add to queue", "Appends the checked plan to the queue (Ctrl+J)."

@@ -4,6 +4,7 @@ from pathlib import Path
 
 from PySide6.QtCore import QSettings, Qt, Signal
 from PySide6.QtWidgets import (
+    QCheckBox,
     QComboBox,
     QHBoxLayout,
     QLabel,
@@ -119,6 +120,8 @@ class SetupPage(QWidget):
         self.theme.setAccessibleName(texts.THEME)
         self.theme.setToolTip(texts.THEME_TIP)
         ignore_wheel(self.theme)
+        self.sounds = QCheckBox(texts.SOUNDS, checked=True)
+        self.sounds.setToolTip(texts.SOUNDS_TIP)
         self._arrange()
         self.open_file.clicked.connect(self._ask_configuration)
         self.open_specimen.clicked.connect(self._ask_specimen)
@@ -207,6 +210,7 @@ class SetupPage(QWidget):
         colours = QHBoxLayout()
         colours.addWidget(QLabel(texts.THEME))
         colours.addWidget(self.theme, 1)
+        colours.addWidget(self.sounds)
         column.addLayout(colours)
         right = QSplitter(Qt.Orientation.Vertical)
         right.setChildrenCollapsible(False)

@@ -36,6 +36,7 @@ from bench.app.gui.queue_runner import QueueRunner
 from bench.app.gui.results_page import ResultsPage
 from bench.app.gui.run_page import RunPage
 from bench.app.gui.setup_page import SetupPage
+from bench.app.gui.sound import Sounds
 from bench.app.gui.trouble import OwnErrors, TroublePanel
 from bench.app.ipc.messages import Run
 from bench.app.queue.file import QueueFile
@@ -85,6 +86,8 @@ def free_tab_key(whole: QWidget) -> None:
 SMALLEST = (500, 260)
 """Minimum size of the window [px]: a 1024x600 screen at 200 % scale, less the title bar."""
 FIRST = (1280, 800)
+_SOUNDS = "sounds"
+"""Setting of the signal tones: on or off."""
 
 
 class Window(QMainWindow):
@@ -129,6 +132,7 @@ class Window(QMainWindow):
             self.pages.addTab(page, name)
             self.pages.setTabToolTip(number, f"Ctrl+{number + 1}")
             QShortcut(QKeySequence(f"Ctrl+{number + 1}"), self, partial(self.pages.setCurrentIndex, number))
+        self.sounds = Sounds(controller, self)
         self.welcome = Tour(controller)
         if not tour:
             self.welcome.leave()
@@ -149,6 +153,7 @@ class Window(QMainWindow):
         self._update_title()
         if settings is not None:
             restore(self, self.pages, settings)
+            self.setup.sounds.setChecked(settings.value(_SOUNDS, "on") == "on")
 
     def use_theme(self, theme: Theme) -> None:
         """Use the colours of another theme."""
@@ -200,6 +205,7 @@ class Window(QMainWindow):
         controller.ended.connect(self._ended)
         runner.troubled.connect(self.trouble.show_trouble)
         self.setup.opened.connect(self._configure)
+        self.setup.sounds.toggled.connect(self._mute)
         # the points of the last run stay until a run begins; a plan check does not remove them
         for source in (runner, self.protocol, self.setup.loop):
             source.predicted.connect(self.run.predict)
@@ -225,6 +231,11 @@ class Window(QMainWindow):
         self.runner.configuration = configuration
         self.welcome.give_way("a real bench", to=configuration.backend != "simulated")
         self._update_title()
+
+    def _mute(self, sounds: bool) -> None:
+        self.sounds.muted = not sounds
+        if self._settings is not None:
+            self._settings.setValue(_SOUNDS, "on" if sounds else "off")
 
     def _update_title(self) -> None:
         name = self.setup.path.name if self.setup.path is not None else texts.VIRTUAL_SHORT
