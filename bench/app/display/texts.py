@@ -288,6 +288,15 @@ PRESET_LOADED, PRESET_SAVED, PRESET_DELETED = "Preset {name}.", "Saved: {path}",
 PRESET_NO_NAME, PRESET_NONE = "type a name first", "there is no preset with this name"
 PRESET_INVALID = "Invalid values are marked in the form."
 PRESET_UNKNOWN = "Not in this protocol: {values}."
+HELP, HELP_TIP = "?", "Help on the parameter whose field has the focus (F1)."
+HELP_DEFAULT, HELP_USUAL = "Default: {default}.", "Usual: {low} to {high}{unit}; other values cause a notice."
+HELP_TYPED = "Command line: `--{option}`. Protocol file: `{key}`."
+HELP_PAGE = "Reference: {page}"
+HELP_OPEN, HELP_OPEN_TIP = (
+    "Open the page",
+    "Opens the page of the documentation on this computer, in the desktop's program.",
+)
+HELP_CLOSE, HELP_CLOSE_TIP = "Close the help", "Shows the plan again."
 SOUNDS = "Sounds"
 SOUNDS_TIP = "Beeps: one for a question, two for the end of a run, five for an abort. Kept for the next start."
 RECENT, RECENT_TIP = "Recent configurations", "Opens a configuration that was used before."

@@ -43,6 +43,10 @@ class Form(QWidget):
                 layout.addRow(_name(entry), self._line(entry, values.get(entry.name, entry.default)))
         self._check()
 
+    def entry_of(self, field: QWidget | None) -> Declared | None:
+        """The parameter of a field; None for any other widget."""
+        return next((each for each in declared(self._model) if self.fields.get(each.name) is field), None)
+
     def parameters(self) -> Parameters:
         """Parameters as entered. Raises InvalidInput for the first invalid value."""
         return validated(self._model, self._data())
@@ -138,6 +142,11 @@ def _typed(entry: Declared, value: Any) -> str:
     return _exactly(value)
 
 
+def default_text(entry: Declared) -> str:
+    """The default as typed; empty if there is none."""
+    return _typed(entry, entry.default)
+
+
 def _absent(value: object) -> bool:
     return value is None or type(value).__name__ == "PydanticUndefinedType"
 
@@ -159,7 +168,7 @@ def _tip(entry: Declared) -> str:
         f"{typeset(entry.description[:1].upper() + entry.description[1:])}.",
         texts.MUST_BE.format(allowed=typeset(entry.allowed_in_unit)),
     ]
-    default = _typed(entry, entry.default)
+    default = default_text(entry)
     return "\n".join([*lines, texts.DEFAULT_TIP.format(default=default)] if default else lines)
 
 

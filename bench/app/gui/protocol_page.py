@@ -8,13 +8,25 @@ from pathlib import Path
 from typing import Any, cast
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QComboBox, QHBoxLayout, QPushButton, QScrollArea, QSplitter, QVBoxLayout, QWidget
+from PySide6.QtWidgets import (
+    QApplication,
+    QComboBox,
+    QHBoxLayout,
+    QPushButton,
+    QScrollArea,
+    QSplitter,
+    QStackedWidget,
+    QVBoxLayout,
+    QWidget,
+)
 
 from bench.app.display import texts
 from bench.app.display.typography import typeset
 from bench.app.folders import check_folder, default_folder, make_folder, remove_unused, result_names
 from bench.app.gui.controller import Controller
 from bench.app.gui.form import Form, RunOptions
+from bench.app.gui.header import application
+from bench.app.gui.help_panel import HelpPanel
 from bench.app.gui.plan_view import PlanView
 from bench.app.gui.preset_bar import PresetBar
 from bench.app.gui.widgets import FITTING, give_key, ignore_wheel, scrolling
@@ -61,6 +73,7 @@ class ProtocolPage(QWidget):
         self._forms: dict[str, Form] = {}
         self.form_area = QScrollArea(widgetResizable=True)
         self.plan, self.options = PlanView(), RunOptions(configuration)
+        self.help, self.ask_help, self.right = HelpPanel(), QPushButton(texts.HELP), QStackedWidget()
         self.folder, self.operator = self.options.folder, self.options.operator
         self.realtime, self.person, self.keep_going = (
             self.options.realtime,
@@ -81,6 +94,9 @@ class ProtocolPage(QWidget):
         self.start.clicked.connect(self.begin)
         self.add.clicked.connect(self.enqueue)
         self.leave.clicked.connect(self.leave_editing)
+        self.ask_help.clicked.connect(self.explain)
+        self.help.closed.connect(self._show_plan)
+        application().focusChanged.connect(self._focus_changed)
         controller.plan_checked.connect(self._plan_checked)
         controller.changed.connect(self.refresh)
         controller.ended.connect(self._ended)
@@ -122,6 +138,7 @@ class ProtocolPage(QWidget):
             self.plan.refuse(str(error))
             return
         self._checked, self._checking = None, True
+        self._show_plan()
         self.plan.show_text(texts.CHECKING)
         self._controller.check_plan(plan, by=self)
         self.refresh()
@@ -177,6 +194,14 @@ class ProtocolPage(QWidget):
             self.refresh()
             self.left.emit()
 
+    def explain(self) -> None:
+        """Show the help on the parameter whose field has the focus, or on the first one."""
+        form = self.form
+        entry = form.entry_of(QApplication.focusWidget()) or form.entry_of(next(iter(form.fields.values()), None))
+        if entry is not None:
+            self.help.explain(self.entry, entry)
+            self.right.setCurrentWidget(self.help)
+
     def refresh(self) -> None:
         """Enable the buttons; their tooltips give the reason where they are disabled."""
         why, unplanned = self.why_not, self.why_not_planned
@@ -188,6 +213,15 @@ class ProtocolPage(QWidget):
         self.check.setEnabled(not self._checking and not self.form.refused)
         self.check.setToolTip(texts.START_BAD if self.form.refused else texts.CHECK_TIP)
         self.plan.warn(texts.UNATTENDED if self.options.unattended else "")
+
+    def _show_plan(self) -> None:
+        self.right.setCurrentWidget(self.plan)
+
+    def _focus_changed(self, _before: QWidget | None, now: QWidget | None) -> None:
+        """Let the help that is shown follow the focus."""
+        entry = self.form.entry_of(now)
+        if entry is not None and self.right.currentWidget() is self.help:
+            self.help.explain(self.entry, entry)
 
     def _plan_check(self) -> PlanCheck:
         """The plan in the form. Raises InvalidInput."""
@@ -264,6 +298,10 @@ class ProtocolPage(QWidget):
             give_key(button, key)
             button.setToolTip(tip)
             button.setMinimumHeight(48)
+        give_key(self.ask_help, "F1")
+        self.ask_help.setToolTip(texts.HELP_TIP)
+        # the field keeps the focus
+        self.ask_help.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         # a key press meant for the form must not start a run
         self.start.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.leave.hide()
@@ -274,9 +312,15 @@ class ProtocolPage(QWidget):
         for button in (self.presets.last_values, self.presets.defaults):
             top.addWidget(button)
         plan.addLayout(top)
-        for part in (self.presets, self.form_area, self.options):
+        second = QHBoxLayout()
+        second.addWidget(self.presets, 1)
+        second.addWidget(self.ask_help, 0, Qt.AlignmentFlag.AlignTop)
+        plan.addLayout(second)
+        for part in (self.form_area, self.options):
             plan.addWidget(part, int(part is self.form_area))
-        found.addWidget(self.plan, 1)
+        for part in (self.plan, self.help):
+            self.right.addWidget(part)
+        found.addWidget(self.right, 1)
         buttons = QHBoxLayout()
         buttons.addStretch(1)
         for button in (self.check, self.add, self.leave, self.start):

@@ -12,6 +12,7 @@ from bench.app.catalogue import installed_protocol, parameters_of
 from bench.app.display import texts
 from bench.app.display.theme import LIGHT
 from bench.app.gui.controller import Controller
+from bench.app.gui.help_panel import reference_text
 from bench.app.gui.palette import dress
 from bench.app.gui.panels import TASKS, UNKNOWN_TASK
 from bench.app.gui.window import Window
@@ -19,6 +20,7 @@ from bench.app.ipc.messages import PlanChecked, Run
 from bench.app.preflight import compile_run
 from bench.app.queue.queue import Stage, queued
 from bench.app.run_display import Notice
+from bench.config.declared import declared
 from bench.config.model import BenchConfiguration
 from bench.config.toml import read_configuration
 from bench.config.validation import validated
@@ -90,7 +92,9 @@ def test_the_form_of_every_protocol_and_its_test_in_the_queue(
     page = shown.protocol
     shown.pages.setCurrentWidget(page)
     page.choice.setCurrentText(protocol.name)
+    page.explain()
     assert not _faults(page, monkeypatch)
+    assert not faults(("help", text) for each in declared(protocol.parameters) for text in reference_text(each))
     for field in page.form.fields.values():
         if hasattr(field, "setText"):
             # every value is refused, with its reason
