@@ -223,8 +223,10 @@ TOUR = (
     "Check the plan (Ctrl+K)",
     "Start (Ctrl+Return)",
     "Watch the gain converge to its prediction on the Run page",
-    "Open the file on the Results page",
+    "Read the verdict on the Results page, then open Figure",
 )
+TOUR_SHOW, TOUR_SHOW_TIP = "Show me", "Opens the page of the current step; its part is framed."
+TOUR_COMPLETE = "The tour is complete. Change a value on the Protocol page, and check the plan again for your own test."
 WELCOME_CLOSE = "Hide"
 CONFIGURATION = "Configuration"
 VIRTUAL_SHORT = "simulated bench"

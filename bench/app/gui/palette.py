@@ -60,6 +60,8 @@ def style_sheet(theme: Theme) -> str:
     QFrame#prompt {{ border: 3px solid {theme.wait}; background: {theme.raised}; }}
     QFrame#trouble, QFrame#leave {{ border: 3px solid {theme.alarm}; background: {theme.raised}; }}
     QFrame#welcome {{ border: 1px solid {theme.faint}; background: {theme.raised}; }}
+    QFrame#welcome QLabel[guided="yes"] {{ font-weight: bold; }}
+    QPushButton[guided="yes"], QTabWidget[guided="yes"]::pane {{ border: 3px solid {theme.wait}; border-radius: 4px; }}
     QPushButton#stop {{ background: #b30000; color: white; font-size: {BANNER}pt; font-weight: bold;
         min-width: 250px; min-height: 72px; padding: 2px; border: 3px solid {theme.text}; border-radius: 8px; }}
     QPushButton#stop[low="yes"] {{ font-size: {SMALL}pt; min-width: 130px; min-height: 50px; }}

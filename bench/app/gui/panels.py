@@ -1,4 +1,4 @@
-"""Panels between header and pages: the question to the operator, and the guided tour."""
+"""Panels between header and pages: the question to the operator, and the question before closing the window."""
 
 from collections.abc import Callable, Sequence
 
@@ -9,9 +9,9 @@ from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QPushButton, QScrollA
 from bench.app.display import texts
 from bench.app.display.typography import typeset
 from bench.app.gui.controller import Controller
-from bench.app.gui.widgets import give_key, set_level
-from bench.app.ipc.messages import Ended, PlanChecked, Question
-from bench.events import Event, OperatorAsked, PointFinished
+from bench.app.gui.widgets import give_key
+from bench.app.ipc.messages import Question
+from bench.events import Event, OperatorAsked
 from drivers.rig import OperatorTask
 
 UNREAD = 700
@@ -194,9 +194,6 @@ class PanelArea(QScrollArea):
             self.setFixedHeight(height)
 
 
-DONE, NEXT, LATER = "✓", "▶", "○"
-
-
 class LeavePanel(QFrame):
     """A panel that asks whether to close the window during a run; `leave` closes it."""
 
@@ -219,66 +216,3 @@ class LeavePanel(QFrame):
         self.question.setText(texts.LEAVE_GOES_ON if goes_on else texts.LEAVE_RAMPS_OUT)
         self.show()
         self.stay.setFocus()
-
-
-class Tour(QFrame):
-    """The guided tour, which shows the next step without performing it."""
-
-    def __init__(self, controller: Controller) -> None:
-        super().__init__()
-        self.setObjectName("welcome")
-        self.setAccessibleName(texts.NAMES["tour"])
-        self.step = 0
-        self._wanted, self._reasons = True, set[str]()
-        self.steps = [QLabel(wordWrap=True) for _ in texts.TOUR]
-        row = QHBoxLayout()
-        for label in self.steps:
-            row.addWidget(label, 1)
-        hide = QPushButton(texts.WELCOME_CLOSE)
-        hide.clicked.connect(self.leave)
-        whole = QHBoxLayout(self)
-        words = QVBoxLayout()
-        words.addWidget(QLabel(texts.WELCOME, wordWrap=True))
-        words.addLayout(row)
-        whole.addLayout(words, 1)
-        whole.addWidget(hide)
-        controller.plan_checked.connect(self._plan_checked)
-        controller.began.connect(lambda: self._reach(2))
-        controller.event_received.connect(self._tell)
-        controller.ended.connect(self._ended)
-        self._show()
-
-    def leave(self) -> None:
-        """Close the tour permanently."""
-        self._wanted = False
-        self.setVisible(False)
-
-    def give_way(self, reason: str, *, to: bool) -> None:
-        """Hide for a `reason`: more important content needs the space, or the bench is not simulated."""
-        (self._reasons.add if to else self._reasons.discard)(reason)
-        self.setVisible(self._wanted and not self._reasons)
-
-    def _plan_checked(self, found: object) -> None:
-        if self.step < 2:
-            self._go(1 if isinstance(found, PlanChecked) and found.refusal is None else 0)
-
-    def _tell(self, event: object) -> None:
-        if isinstance(event, PointFinished):
-            self._reach(3)
-
-    def _ended(self, ended: object) -> None:
-        """Return to the first step after an interrupted run."""
-        self._go(len(self.steps) if self.step == 3 and isinstance(ended, Ended) else 0)
-
-    def _reach(self, step: int) -> None:
-        self._go(max(self.step, step))
-
-    def _go(self, step: int) -> None:
-        self.step = step
-        self._show()
-
-    def _show(self) -> None:
-        for place, (label, text) in enumerate(zip(self.steps, texts.TOUR, strict=True)):
-            mark = DONE if place < self.step else NEXT if place == self.step else LATER
-            label.setText(f"{mark} {place + 1}. {text}")
-            set_level(label, "wait" if mark == NEXT else "calm")

@@ -29,7 +29,7 @@ from bench.app.gui.attach import SessionWatch
 from bench.app.gui.controller import Controller
 from bench.app.gui.header import Header, StopFilter
 from bench.app.gui.palette import chosen_theme, dress
-from bench.app.gui.panels import LeavePanel, PanelArea, Prompt, Tour
+from bench.app.gui.panels import LeavePanel, PanelArea, Prompt
 from bench.app.gui.protocol_page import ProtocolPage
 from bench.app.gui.queue_page import QueuePage
 from bench.app.gui.queue_runner import QueueRunner
@@ -37,6 +37,7 @@ from bench.app.gui.results_page import ResultsPage
 from bench.app.gui.run_page import RunPage
 from bench.app.gui.setup_page import SetupPage
 from bench.app.gui.sound import Sounds
+from bench.app.gui.tour import Place, Tour
 from bench.app.gui.trouble import OwnErrors, TroublePanel
 from bench.app.ipc.messages import Run
 from bench.app.queue.file import QueueFile
@@ -134,7 +135,9 @@ class Window(QMainWindow):
             QShortcut(QKeySequence(f"Ctrl+{number + 1}"), self, partial(self.pages.setCurrentIndex, number))
         self.sounds = Sounds(controller, self)
         self.welcome = Tour(controller)
-        if not tour:
+        if tour:
+            self._guide()
+        else:
             self.welcome.leave()
         self.leave_panel = LeavePanel(self.leave)
         for part in (self.prompt, self.trouble, self.leave_panel):
@@ -213,6 +216,26 @@ class Window(QMainWindow):
         self.protocol.saved.connect(runner.replace)
         self.protocol.left.connect(lambda: self.pages.setCurrentWidget(self.queue))
         self.queue.edit_requested.connect(self._edit)
+
+    def _guide(self) -> None:
+        """Let the tour frame the parts of its steps, and complete it with the figure of the run."""
+        pages, results = self.pages, self.results
+        self.welcome.guide(
+            [
+                Place(partial(pages.setCurrentWidget, self.protocol), self.protocol.check),
+                Place(partial(pages.setCurrentWidget, self.protocol), self.protocol.start),
+                Place(partial(pages.setCurrentWidget, self.run)),
+                Place(partial(pages.setCurrentWidget, results), results.parts),
+            ]
+        )
+
+        def opened(place: int) -> None:
+            if results.parts.widget(place) is results.figures:
+                self.welcome.read_results()
+
+        results.parts.currentChanged.connect(opened)
+        # the figure may be the one that is shown already
+        results.parts.tabBarClicked.connect(opened)
 
     def _began(self, run: Run) -> None:
         self._goes_on = run.keep_going

@@ -3,12 +3,14 @@
 from pathlib import Path
 
 import pytest
+from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
 
+from bench.app.display import texts
 from bench.app.display.theme import LIGHT
 from bench.app.display.trouble import Trouble
 from bench.app.gui.controller import Controller
-from bench.app.gui.panels import DONE, LATER, NEXT, Tour
+from bench.app.gui.tour import DONE, LATER, NEXT, Tour
 from bench.app.gui.window import Window
 from bench.app.ipc.messages import Ended, PlanChecked, Question, Refused
 from bench.config.model import BenchConfiguration
@@ -18,6 +20,7 @@ from tests.bench.app.gui.conftest import PROTOCOLS, SHAKING
 from tests.bench.app.ipc.experiment import bench, order
 
 FINE = PlanChecked((), None, (), 60.0, 1e6, 1e9, "hash", {})
+COMPLETED = Ended("completed", "the plan was carried out", {}, "", Path("never"))
 TIGHT = PlanChecked((), "drift: too near", (), 60.0, 1e6, 1e9, "hash", {})
 
 
@@ -48,8 +51,13 @@ def test_steps_follow_what_was_done(controller: Controller) -> None:
     controller.plan_checked.emit(TIGHT, None)
     controller.event_received.emit(PointFinished(Parameters(), time=2.0))
     assert _marks(tour) == 3 * DONE + NEXT
-    controller.ended.emit(Ended("completed", "the plan was carried out", {}, "", Path("never")))
+    tour.read_results()
+    assert _marks(tour) == 3 * DONE + NEXT, "the run has not ended"
+    controller.ended.emit(COMPLETED)
+    assert _marks(tour) == 3 * DONE + NEXT, "until the results were read"
+    tour.read_results()
     assert _marks(tour) == 4 * DONE
+    assert tour.welcome.text() == texts.TOUR_COMPLETE
 
 
 @pytest.mark.parametrize(
@@ -62,7 +70,45 @@ def test_a_run_without_a_point_is_begun_again(controller: Controller, ended: End
     assert _marks(controller.property("tour")) == NEXT + 3 * LATER
 
 
-@pytest.mark.usefixtures("without_plots", "spoken")
+@pytest.mark.usefixtures("without_live_plots", "spoken")
+def test_each_step_frames_its_part_and_waits_for_it(qtbot: QtBot) -> None:
+    controller = Controller()
+    window = Window(controller, bench(), (SHAKING, *PROTOCOLS), LIGHT, tour=True)
+    qtbot.addWidget(window)
+    window.show()
+    tour, tabs = window.welcome, window.results.parts
+    parts = (window.protocol.check, window.protocol.start, tabs)
+
+    def framed() -> list[bool]:
+        return [part.property("guided") == "yes" for part in parts]
+
+    window.pages.setCurrentWidget(window.setup)
+    assert framed() == [True, False, False]
+    qtbot.mouseClick(tour.show_me, Qt.MouseButton.LeftButton)
+    assert window.pages.currentWidget() is window.protocol
+    assert _marks(tour)[0] == NEXT, "showing is not doing"
+    controller.plan_checked.emit(FINE, None)
+    assert framed() == [False, True, False]
+    controller.began.emit(order(Path("never")))
+    assert framed() == [False, False, False]
+    controller.event_received.emit(PointFinished(Parameters(), time=2.0))
+    assert framed() == [False, False, True]
+    controller.question_changed.emit(Question(1, "Mount the spring."))
+    assert framed() == [False, False, False], "a question comes first"
+    controller.question_changed.emit(None)
+    controller.ended.emit(COMPLETED)
+    qtbot.mouseClick(tour.show_me, Qt.MouseButton.LeftButton)
+    assert window.pages.currentWidget() is window.results
+    window.results.parts.setCurrentWidget(window.results.histories)
+    assert framed() == [False, False, True]
+    window.results.parts.setCurrentWidget(window.results.figures)
+    assert framed() == [False, False, False]
+    assert _marks(tour) == 4 * DONE
+    assert not tour.show_me.isVisible()
+    window.close()
+
+
+@pytest.mark.usefixtures("without_live_plots", "spoken")
 def test_the_tour_gives_way_to_what_matters_and_to_a_real_bench(qtbot: QtBot) -> None:
     controller = Controller()
     window = Window(controller, bench(), (SHAKING, *PROTOCOLS), LIGHT, tour=True)
