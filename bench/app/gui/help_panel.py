@@ -7,7 +7,6 @@ from PySide6.QtCore import Qt, QUrl, Signal
 from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWidget
 
-import bench
 from bench.app.display import texts
 from bench.app.display.typography import label, typeset
 from bench.app.gui.form import default_text
@@ -24,7 +23,7 @@ def reference_page(protocol: str, root: Path | None = None) -> tuple[str, QUrl |
     """Path of the reference of a protocol's parameters, and the address of the page in the built site or in the
     checkout at `root`; None for an installation without pages.
     """
-    root = Path(bench.__file__).parents[1] if root is None else root
+    root = Path(__file__).parents[3] if root is None else root
     section = f"parameters-of-{protocol}"
     site, page = root / "site" / PAGE.with_suffix("") / "index.html", root / "docs" / PAGE
     found = next((each for each in (site, page) if each.is_file()), None)
