@@ -186,6 +186,7 @@ class Window(QMainWindow):
             remember(self, self.pages, self._settings)
         self._controller.close()
         self.runner.close()
+        self.sounds.muted = True
         super().closeEvent(event)
 
     def leave(self) -> None:
