@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, cast
 
-from PySide6.QtCore import Signal
+from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QCheckBox, QComboBox, QFormLayout, QHBoxLayout, QLabel, QLineEdit, QVBoxLayout, QWidget
 
 from bench.app.display import texts
@@ -43,8 +43,8 @@ class Form(QWidget):
                 layout.addRow(_name(entry), self._line(entry, values.get(entry.name, entry.default)))
         self._check()
 
-    def entry_of(self, field: QWidget | None) -> Declared | None:
-        """The parameter of a field; None for any other widget."""
+    def entry_of(self, field: QObject | None) -> Declared | None:
+        """The parameter of a field; None for anything else."""
         return next((each for each in declared(self._model) if self.fields.get(each.name) is field), None)
 
     def parameters(self) -> Parameters:

@@ -7,7 +7,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any, cast
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import QEvent, QObject, Qt, Signal
 from PySide6.QtWidgets import (
     QApplication,
     QComboBox,
@@ -25,7 +25,6 @@ from bench.app.display.typography import typeset
 from bench.app.folders import check_folder, default_folder, make_folder, remove_unused, result_names
 from bench.app.gui.controller import Controller
 from bench.app.gui.form import Form, RunOptions
-from bench.app.gui.header import application
 from bench.app.gui.help_panel import HelpPanel
 from bench.app.gui.plan_view import PlanView
 from bench.app.gui.preset_bar import PresetBar
@@ -96,7 +95,6 @@ class ProtocolPage(QWidget):
         self.leave.clicked.connect(self.leave_editing)
         self.ask_help.clicked.connect(self.explain)
         self.help.closed.connect(self._show_plan)
-        application().focusChanged.connect(self._focus_changed)
         controller.plan_checked.connect(self._plan_checked)
         controller.changed.connect(self.refresh)
         controller.ended.connect(self._ended)
@@ -217,11 +215,13 @@ class ProtocolPage(QWidget):
     def _show_plan(self) -> None:
         self.right.setCurrentWidget(self.plan)
 
-    def _focus_changed(self, _before: QWidget | None, now: QWidget | None) -> None:
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         """Let the help that is shown follow the focus."""
-        entry = self.form.entry_of(now)
-        if entry is not None and self.right.currentWidget() is self.help:
-            self.help.explain(self.entry, entry)
+        if event.type() == QEvent.Type.FocusIn and self.right.currentWidget() is self.help:
+            entry = self.form.entry_of(watched)
+            if entry is not None:
+                self.help.explain(self.entry, entry)
+        return super().eventFilter(watched, event)
 
     def _plan_check(self) -> PlanCheck:
         """The plan in the form. Raises InvalidInput."""
@@ -252,6 +252,8 @@ class ProtocolPage(QWidget):
         self.form = self._forms[self.entry.name] = form
         self.presets.use(self.entry, form)
         form.edited.connect(self._edited)
+        for field in form.fields.values():
+            field.installEventFilter(self)
         self.form_area.setWidget(form)
         form.show()
         order = [self.choice, *form.fields.values(), self.folder]
