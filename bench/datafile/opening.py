@@ -6,7 +6,7 @@ them.
 
 import re
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -78,8 +78,12 @@ _ATTEMPTS, _PAUSE = 3, 0.1
 _HINT = "`rockbench file recover` restores the readable part"
 
 
-def open_file(path: Path, *, judging: bool = False, kinds: tuple[str, ...] = (FORMAT,)) -> hdf5.File:
-    """Open a file of one of the `kinds`; see `bench.datafile.reader.open_datafile`."""
+def open_file(
+    path: Path, *, judging: bool = False, kinds: tuple[str, ...] = (FORMAT,), only: Sequence[str] = ()
+) -> hdf5.File:
+    """Open a file of one of the `kinds`; see `bench.datafile.reader.open_datafile`. The caller reads `only` these
+    members of /entry, which alone are then checked.
+    """
     if path.is_dir():
         raise InvalidInput("record", str(path), "it is a directory; specify a file in it")
     if not path.is_file():
@@ -87,7 +91,7 @@ def open_file(path: Path, *, judging: bool = False, kinds: tuple[str, ...] = (FO
     file = _opened(path, judging)
     try:
         _check_format(path, file, kinds)
-        check_structure(file, path)
+        check_structure(file, path, only)
     except BaseException:
         file.close()
         raise

@@ -6,6 +6,7 @@ Values, link targets and external storage are not accessed. Reading the structur
 memory, crash the process, or open other files.
 """
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, cast
 
@@ -63,6 +64,14 @@ class _Judge:
             except UNREADABLE:
                 # damage is handled where the object is read
                 continue
+
+    def members(self, root: Any, names: Sequence[str]) -> None:
+        """Check the named members of /entry and the objects below them. Raises KeyError for an absent member."""
+        if not is_hard_link(root, "entry"):
+            raise DataFileError("/entry is a link, which this program never writes")
+        entry = stored_member(root, "entry")
+        for name in names:
+            self._member(entry, name, f"/entry/{name}", 1)
 
     def _member(self, group: Any, name: str, path: str, depth: int) -> None:
         if not is_hard_link(group, name):
@@ -141,14 +150,18 @@ def check_attributes(owner: Any, path: str) -> None:
             )
 
 
-def check_structure(file: File, path: Path) -> None:
-    """Raise DataFileError, naming the object, for a structure that this program never writes.
+def check_structure(file: File, path: Path, only: Sequence[str] = ()) -> None:
+    """Raise DataFileError, naming the object, for a structure that this program never writes; of the members of
+    /entry, only those that are named are checked, if `only` is given.
 
     Unreadable members are left to the readers and to recovery.
     """
     root, judge = cast(Any, file), _Judge(path.stat().st_size)
     try:
-        judge.group(root)
+        if only:
+            judge.members(root, only)
+        else:
+            judge.group(root)
     except DataFileError as error:
         raise DataFileError(f"{path} is not accepted: {error}") from None
     except UNREADABLE:

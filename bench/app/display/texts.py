@@ -214,6 +214,40 @@ FAILED = (
     "The session failed: {text}. Its file contains the data measured until then. Look at the bench: if "
     "the table moves, press the emergency stop."
 )
+RUN_TITLES = ("", "protocol", "status", "result", "specimen", "operator", "date", "folder")
+RUN_TITLE_TIPS = (
+    "Tick a run to draw it together with the other ticked ones and to compare it with the reference.",
+    "protocol",
+    "how the run ended; running: its file is being written",
+    "main result, with expanded uncertainty (k = 2) and agreement with the prediction",
+    "width and height of the block, stiffness of the first storey; identified: from a specimen file",
+    "operator",
+    "start of the run",
+    "folder of the results",
+)
+RUN_FOREIGN, RUN_DAMAGED, RUN_FILE = "no run", "damaged", "the file"
+RUN_GOING, RUN_GOING_WHY = "running", "its file is being written"
+RUN_CUT = "not closed"
+RUN_CUT_WHY = "its writer was killed or is no longer writing; `rockbench file recover` writes a clean file"
+RUN_PASSED, RUN_NOT_PASSED = "✓ passed", "▲ NOT PASSED"
+RUN_RANGE = "{name} {low} to {high}{unit}, {n} values"
+RUN_AGREEING = "{agree} of {judged} agree"
+RUN_SPECIMEN = "{b:.3g} × {h:.3g} mm, k₁ {k:.4g} N/m, {how}"
+RUN_IDENTIFIED, RUN_ASSUMED = "identified", "assumed"
+RUNS, RUNS_SEARCH = "runs", "search: protocol, result, operator, date, folder, …"
+RUNS_SEARCH_TIP = "Shows only the runs with all of these words in any column or tooltip (Ctrl+F)."
+RUNS_OPEN, RUNS_OPEN_TIP = "Open", "Opens the selected run (Enter or double click)."
+RUNS_AGAINST = "Compare against"
+RUNS_AGAINST_TIP = "Makes the selected run the reference of the comparison (Ctrl+Shift+B)."
+RUNS_FOLDER, RUNS_FOLDER_TIP = "Folder …", "Shows the runs in another folder and in the folders below it."
+RUNS_BACK, RUNS_BACK_TIP = "Opened run", "Returns to the opened run (Ctrl+B)."
+RUNS_ALL, RUNS_ALL_TIP = "All runs", "Shows the list of all runs (Ctrl+B)."
+RUNS_COUNT = "{shown} of {all} files in {folder}"
+RUNS_REFERENCE = "reference: {name}, compared: {n}"
+RUNS_READING = "reading {n}"
+RUNS_NONE = "No data file in {folder}."
+RUNS_NO_FOLDER = "{folder} does not exist yet: the first run creates it."
+RUNS_UNREAD = "▲ {folder} cannot be read: {why}"
 
 WELCOME = (
     "Guided tour: this is the simulated bench; no hardware moves. The form contains one harmonic point, which runs as "

@@ -19,7 +19,7 @@ from sim.parameters import Parameters, unit_of
 def verdict_of(view: RunView, finished: Parameters) -> str:
     """The result of a finished point: value, prediction, verdict and point, or the reason for a missing value."""
     point = finished.model_dump()
-    rows = rows_of(_columns(type(finished)), [point], view.labels)
+    rows = rows_of(columns_of(type(finished)), [point], view.labels)
     found = next((row for row in rows if row.field == view.headline), rows[0] if rows else None)
     if found is not None and isfinite(found.value):
         return found.sentence.replace(" = ", " ")
@@ -48,7 +48,8 @@ def running_verdict(event: Estimate | RunningGain | LiveValue) -> str:
     return " · ".join([*words, effort] if effort else words)
 
 
-def _columns(point: type[Parameters]) -> Mapping[str, Column]:
+def columns_of(point: type[Parameters]) -> Mapping[str, Column]:
+    """The declared fields of a point as empty columns, with unit and description."""
     return {
         name: Column(np.zeros(0), unit_of(declared), declared.description or "")
         for name, declared in point.model_fields.items()

@@ -112,10 +112,10 @@ class FileList(QListWidget):
 
     def put(self, file: RunFile, place: Place = Place.TOO) -> None:
         """Add `file`; replaces an earlier reading of the same file."""
-        places = [row for row, each in enumerate(self._files) if each.path.resolve() == file.path.resolve()]
-        row = places[0] if places else len(self._files)
+        place_of = self._place(file.path)
+        row = len(self._files) if place_of is None else place_of
         self.blockSignals(True)
-        if places:
+        if place_of is not None:
             self._files[row] = file
         else:
             self._files.append(file)
@@ -138,6 +138,32 @@ class FileList(QListWidget):
         for each in range(self.count()):
             if each == row or alone:
                 self.item(each).setCheckState(Qt.CheckState.Checked if each == row else Qt.CheckState.Unchecked)
+
+    def holds(self, path: Path) -> bool:
+        """Whether a file is open."""
+        return self._place(path) is not None
+
+    def tick(self, path: Path, *, on: bool) -> None:
+        """Tick or untick an open file; the first one is also selected."""
+        if (row := self._place(path)) is not None:
+            self.item(row).setCheckState(Qt.CheckState.Checked if on else Qt.CheckState.Unchecked)
+            if self.currentRow() < 0:
+                self.setCurrentRow(row)
+
+    def make_first(self, path: Path) -> None:
+        """Move an open file to the top: the first ticked one is the reference."""
+        if (row := self._place(path)) is not None:
+            self.blockSignals(True)
+            chosen = self.currentItem()
+            self._files.insert(0, self._files.pop(row))
+            self.insertItem(0, self.takeItem(row))
+            self.setCurrentItem(chosen)
+            self.blockSignals(False)
+            self.ticked_changed.emit()
+
+    def _place(self, path: Path) -> int | None:
+        wanted = path.resolve()
+        return next((row for row, each in enumerate(self._files) if each.path.resolve() == wanted), None)
 
     def remove_chosen(self) -> None:
         row = self.currentRow()

@@ -1,38 +1,38 @@
-"""The Results page: points, gains and samples of data files, with comparison, report and export."""
+"""The Results page: the runs of a folder, and points, gains and samples of the opened ones, with comparison, report and
+export.
+"""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QDragEnterEvent, QDropEvent
 from PySide6.QtWidgets import (
-    QAbstractItemView,
     QCheckBox,
     QHBoxLayout,
-    QHeaderView,
     QLabel,
     QLineEdit,
     QPushButton,
     QSplitter,
-    QTableWidget,
-    QTableWidgetItem,
+    QStackedWidget,
     QTabWidget,
     QVBoxLayout,
     QWidget,
 )
 
 from bench.app.display import texts
-from bench.app.display.gains import Difference, compare, kind_of
-from bench.app.display.point_table import every_field, rows_of, summary_of
+from bench.app.display.gains import compare, kind_of
+from bench.app.display.point_table import rows_of, summary_of
 from bench.app.display.theme import Theme
 from bench.app.display.typography import typeset
-from bench.app.formatting import ABSENT, number
 from bench.app.gui.controller import Controller
 from bench.app.gui.figure_view import FigureView
 from bench.app.gui.gain_plot import GainPlot
 from bench.app.gui.history_view import HistoryView
 from bench.app.gui.open_files import FileList, Place, read_file
 from bench.app.gui.outputs import Outputs
+from bench.app.gui.result_tables import read_only, show_differences, show_points
+from bench.app.gui.run_browser import RunBrowser
 from bench.app.gui.widgets import FITTING, ElidingLabel, ask_for_files, give_key, scrolling, set_level, why_no_dialog
 from bench.app.ipc.messages import Ended, Refused
 from bench.datafile.tables import Column
@@ -40,80 +40,23 @@ from bench.results import FILE
 from sim.errors import RockbenchError
 
 
-def read_only(name: str) -> QTableWidget:
-    """An empty read-only table with the accessible name `name`."""
-    table = QTableWidget(0, 0)
-    table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
-    table.setAccessibleName(name)
-    return table
-
-
-def show_points(
-    table: QTableWidget,
-    results: Mapping[str, Column],
-    points: Sequence[Mapping[str, object]],
-    labels: Mapping[str, str],
-    *,
-    everything: bool,
-) -> None:
-    """Show the quantities of every point with prediction and verdict; with `everything`, every field of the file.
-    `labels` are the printed names of fields.
-    """
-    if everything:
-        headings, rows = every_field(results, points)
-        _fill(table, headings, [typeset(of.description) for of in results.values()], rows)
-    else:
-        _fill(table, texts.POINT_TITLES, texts.POINT_TIPS, [each.cells for each in rows_of(results, points, labels)])
-    header = table.horizontalHeader()
-    header.setSectionResizeMode(QHeaderView.ResizeMode.Interactive)
-    if not everything:
-        # keep all six columns in view: a long quantity is elided, and its tooltip shows the full text
-        header.setSectionResizeMode(1, QHeaderView.ResizeMode.Stretch)
-
-
-def show_differences(table: QTableWidget, runs: Sequence[tuple[str, Sequence[Difference]]]) -> None:
-    """Show the points of each run compared with those of the reference."""
-    rows = [
-        [
-            name,
-            each.point,
-            *(number(value) for value in (each.reference, each.other, each.value, each.uncertainty, each.score)),
-            _verdict(each),
-        ]
-        for name, differences in runs
-        for each in differences
-    ]
-    _fill(table, texts.DIFFERENCES, texts.DIFFERENCE_TIPS, rows)
-
-
-def _verdict(each: Difference) -> str:
-    if each.score != each.score:
-        return ABSENT
-    return texts.WITHIN if each.score <= 1.0 else texts.BEYOND
-
-
-def _fill(table: QTableWidget, headings: Sequence[str], tips: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    table.setColumnCount(len(headings))
-    table.setRowCount(len(rows))
-    for column, (heading, tip) in enumerate(zip(headings, tips, strict=True)):
-        header = QTableWidgetItem(heading)
-        header.setToolTip(tip)
-        table.setHorizontalHeaderItem(column, header)
-        for row, cells in enumerate(rows):
-            item = QTableWidgetItem(cells[column])
-            item.setToolTip(cells[column])
-            item.setTextAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
-            table.setItem(row, column, item)
-    table.resizeColumnsToContents()
-
-
 class ResultsPage(QWidget):
-    """Results of the last run or of selected files; ticked files are drawn together."""
+    """Two views: the list of all runs, and the results of the opened ones, of which the ticked are drawn together."""
 
     def __init__(self, controller: Controller, theme: Theme) -> None:
         super().__init__()
         self._controller = controller
         self.message, self.files = QLabel(texts.RESULTS_EMPTY, wordWrap=True), FileList()
+        self.browser, self.views, self.view = RunBrowser(theme), QStackedWidget(), QWidget()
+        self.all_runs = QPushButton(texts.RUNS_ALL)
+        give_key(self.all_runs, "Ctrl+B")
+        self.all_runs.setToolTip(texts.RUNS_ALL_TIP)
+        self.all_runs.clicked.connect(self.browse)
+        self.browser.back.clicked.connect(self.show_run)
+        self.browser.choose.clicked.connect(self._ask_folder)
+        self.browser.opened.connect(self._open_run)
+        self.browser.ticked.connect(self._tick_run)
+        self.browser.referred.connect(self._compare_against)
         # one line: the table below names every point
         self.verdict = ElidingLabel()
         self.verdict.setProperty("role", "verdict")
@@ -151,10 +94,22 @@ class ResultsPage(QWidget):
         """Use the colours of another theme."""
         self.histories.use_theme(theme)
         self.gains.use_theme(theme)
+        self.browser.use_theme(theme)
         self._draw()
+
+    def browse(self) -> None:
+        """Show the list of all runs."""
+        self.views.setCurrentWidget(self.browser)
+        self.browser.table.setFocus()
+
+    def show_run(self) -> None:
+        """Show the opened run."""
+        self.views.setCurrentWidget(self.view)
+        self.files.setFocus()
 
     def show_end(self, ended: Ended | Refused) -> None:
         """Show the status of the finished run and open its file, without changing a displayed comparison."""
+        self.show_run()
         if isinstance(ended, Ended):
             compared = len(self.files.ticked) > 1
             self.show_file(ended.out / FILE, place=Place.ASIDE if compared else Place.ALONE)
@@ -166,14 +121,18 @@ class ResultsPage(QWidget):
             text = texts.FAILED if ended.failed else texts.REFUSED
             self._say(text.format(text=ended.text), "alarm")
 
-    def show_file(self, path: Path, *, place: Place = Place.TOO) -> None:
-        """Open a data file; a read error is reported and leaves the page unchanged."""
+    def show_file(self, path: Path, *, place: Place = Place.TOO) -> bool:
+        """Open a data file, and return whether it was opened; a read error is reported and leaves the page
+        unchanged.
+        """
         try:
             file = read_file(path)
         except (RockbenchError, OSError) as error:
             self._say(str(error), "alarm")
-        else:
-            self.files.put(file, place)
+            self.browser.warn(str(error))
+            return False
+        self.files.put(file, place)
+        return True
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:
         """Accept data files."""
@@ -183,11 +142,26 @@ class ResultsPage(QWidget):
     def dropEvent(self, event: QDropEvent) -> None:
         """Open the dropped files."""
         for url in event.mimeData().urls():
-            self.show_file(Path(url.toLocalFile()))
+            self._show_files([Path(url.toLocalFile())])
+
+    def _open_run(self, path: Path) -> None:
+        """Open a run of the list: alone, unless two or more are compared."""
+        if self.show_file(path, place=Place.TOO if len(self.files.ticked) > 1 else Place.ALONE):
+            self.show_run()
+
+    def _tick_run(self, path: Path, on: bool) -> None:
+        if self.files.holds(path) or self.show_file(path, place=Place.ASIDE):
+            self.files.tick(path, on=on)
+
+    def _compare_against(self, path: Path) -> None:
+        if self.files.holds(path) or self.show_file(path, place=Place.ASIDE):
+            self.files.make_first(path)
+            self.files.tick(path, on=True)
 
     def _choose(self) -> None:
         file = self.files.chosen
         self.remove.setEnabled(file is not None)
+        self.browser.back.setEnabled(file is not None)
         self.outputs.use(None if file is None else file.path)
         self.histories.use(file)
         self.figures.use(None if file is None else file.path)
@@ -210,6 +184,7 @@ class ResultsPage(QWidget):
     def _draw(self) -> None:
         """Draw the gains of all ticked files, with the predicted lines of the first."""
         files = self.files.ticked
+        self.browser.compare([file.path for file in files])
         self.gains.predict(files[0].prediction if files else {})
         for run, file in enumerate(files):
             self.gains.add_all(file.points, run, file.name if len(files) > 1 else "")
@@ -227,22 +202,39 @@ class ResultsPage(QWidget):
         ask_for_files(self, self._controller, texts.OPEN, texts.RUN_FILES, self._show_files, folder="runs", many=True)
 
     def _show_files(self, paths: list[Path]) -> None:
-        for path in paths:
-            self.show_file(path)
+        if [path for path in paths if self.show_file(path)]:
+            self.show_run()
+
+    def _ask_folder(self) -> None:
+        title = texts.RUNS_FOLDER
+        ask_for_files(
+            self, self._controller, title, "", lambda paths: self._use_folder(paths[0]), folder="runs", folders=True
+        )
+
+    def _use_folder(self, folder: Path) -> None:
+        self.browser.use_folder(folder)
+        self.browse()
 
     def _open_typed(self) -> None:
         if self.path.text().strip():
-            self.show_file(FileList.path_of(self.path.text()))
+            path = FileList.path_of(self.path.text())
+            if path.is_dir():
+                self._use_folder(path)
+            else:
+                self._show_files([path])
 
     def _refresh(self) -> None:
         why = why_no_dialog(self._controller)
         self.open_file.setEnabled(not why)
         self.open_file.setToolTip(texts.OPEN_BESIDE.format(why=why) if why else texts.OPEN_TIP)
+        self.browser.choose.setEnabled(not why)
+        self.browser.choose.setToolTip(texts.OPEN_BESIDE.format(why=why) if why else texts.RUNS_FOLDER_TIP)
 
     def _arrange(self) -> None:
         beside = QWidget()
         column = QVBoxLayout(beside)
         column.setContentsMargins(0, 0, 0, 0)
+        column.addWidget(self.all_runs)
         buttons = QHBoxLayout()
         buttons.addWidget(self.open_file)
         buttons.addWidget(self.remove)
@@ -272,11 +264,13 @@ class ResultsPage(QWidget):
         whole.addWidget(beside)
         whole.addWidget(self.parts)
         whole.setSizes([250, 1000])
-        content = QWidget()
-        rows = QVBoxLayout(content)
+        rows = QVBoxLayout(self.view)
         rows.setContentsMargins(0, 0, 0, 0)
         rows.addWidget(self.verdict)
         rows.addWidget(self.message)
         rows.addWidget(whole, 1)
         rows.addWidget(self.outputs)
-        QVBoxLayout(self).addWidget(scrolling(content, *FITTING))
+        for each in (self.browser, self.view):
+            self.views.addWidget(each)
+        self.browser.back.setEnabled(False)
+        QVBoxLayout(self).addWidget(scrolling(self.views, *FITTING))

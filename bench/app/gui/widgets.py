@@ -206,14 +206,17 @@ def ask_for_files(
     *,
     folder: str = "",
     many: bool = False,
+    folders: bool = False,
 ) -> None:
-    """Show the dialog and return at once; `taken` is called with the selected files. The start of a run or a queue
-    closes the dialog.
+    """Show the dialog and return at once; `taken` is called with the selected files, or with the selected folder if
+    `folders` is set. The start of a run or a queue closes the dialog.
     """
     dialog = QFileDialog(parent, title, folder, kinds)
     # a native dialog blocks the window, and STOP with it
     dialog.setOption(QFileDialog.Option.DontUseNativeDialog)
-    dialog.setFileMode(QFileDialog.FileMode.ExistingFiles if many else QFileDialog.FileMode.ExistingFile)
+    one = QFileDialog.FileMode.Directory if folders else QFileDialog.FileMode.ExistingFile
+    dialog.setFileMode(QFileDialog.FileMode.ExistingFiles if many else one)
+    dialog.setOption(QFileDialog.Option.ShowDirsOnly, folders)
     dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
 
     def shut() -> None:

@@ -19,65 +19,17 @@ from bench.app.gui.history_view import read_stretch
 from bench.app.gui.outputs import free
 from bench.app.gui.results_page import ResultsPage
 from bench.app.ipc.messages import Ended
-from bench.config.model import BenchConfiguration
-from bench.datafile.recorder import Recorder
-from bench.datafile.tables import Column
-from bench.events import Acquired, PointFinished
-from drivers.rig import Block, Channel
-from protocols.harmonic.protocol import HarmonicPoint, PointStatus
+from protocols.harmonic.protocol import PointStatus
+from tests.bench.app.gui.run_files import RATE, N, counts, made, point
 from tests.patience import LONG_MS
-
-RATE, N = 1000.0, 4000
-CHANNELS = (
-    Channel("table_acceleration", "acceleration", "m/s2", 1e-3, 0.0, (-32_000, 32_000), "made"),
-    Channel("laser_1", "displacement", "m", 1e-6, 0.0, (-32_000, 32_000), "made"),
-)
-
-
-def _point(omega: float, alpha_2: float | None, spread: float = 0.004) -> HarmonicPoint:
-    status = PointStatus.OVERTURNED if alpha_2 is None else PointStatus.STEADY
-    return HarmonicPoint(
-        omega_rad_s=omega, beta=0.4, status=status, layer="rocking", alpha_2=alpha_2, alpha_2_uncertainty=spread
-    )
-
-
-def _counts(seed: int) -> np.ndarray:
-    return np.random.default_rng(seed).integers(-30_000, 30_000, (N, 2)).astype(np.int16)
-
-
-def _made(folder: Path, *points: HarmonicPoint) -> Path:
-    folder.mkdir()
-    omega = np.array([15.0, 16.0, 17.0])
-    prediction = {
-        "omega": Column(omega, "rad/s", ""),
-        "beta": Column(np.full(3, 0.4), "1", ""),
-        "alpha_2": Column(np.array([0.3, 0.2, 0.4]), "1", ""),
-        "alpha_2_low": Column(np.array([0.28, 0.19, 0.38]), "1", ""),
-        "alpha_2_high": Column(np.array([0.32, 0.22, 0.43]), "1", ""),
-        "layer": Column(np.array(["rocking"] * 3), "", ""),
-    }
-    path = folder / "campaign.h5"
-    metadata = {"configuration": BenchConfiguration().model_dump_json(), "protocol": "harmonic"}
-    recorder = Recorder(
-        path, channels=CHANNELS, sample_rate=RATE, point_type=HarmonicPoint, metadata=metadata,
-        tables={"prediction": prediction},
-    )  # fmt: skip
-    for run in (1, 2):
-        for first in range(0, N, 500):
-            block = Block(first, _counts(run)[first : first + 500])
-            recorder(Acquired(run, block, np.full(500, 0.1 * run), time=first / RATE))
-    for point in points:
-        recorder(PointFinished(point, time=2.0))
-    recorder.close("completed", "the plan was carried out")
-    return path
 
 
 @pytest.fixture(scope="module")
 def files(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     folder = tmp_path_factory.mktemp("results")
     return (
-        _made(folder / "monday", _point(16.0, 0.200), _point(17.0, None)),
-        _made(folder / "tuesday", _point(16.0, 0.212, 0.003), _point(15.0, 0.31)),
+        made(folder / "monday", point(16.0, 0.200), point(17.0, None)),
+        made(folder / "tuesday", point(16.0, 0.212, 0.003), point(15.0, 0.31)),
     )
 
 
@@ -93,8 +45,8 @@ def page(qtbot: QtBot) -> ResultsPage:
 
 
 def test_differences_are_set_against_both_uncertainties() -> None:
-    first = [_point(16.0, 0.200).model_dump(), _point(17.0, None).model_dump()]
-    second = [_point(16.0, 0.212, 0.003).model_dump(), _point(15.0, 0.31).model_dump()]
+    first = [point(16.0, 0.200).model_dump(), point(17.0, None).model_dump()]
+    second = [point(16.0, 0.212, 0.003).model_dump(), point(15.0, 0.31).model_dump()]
     one, fallen, alone = compare(first, second)
     assert one.value == pytest.approx(0.012)
     assert one.uncertainty == pytest.approx(0.005)  # 3-4-5
@@ -108,9 +60,9 @@ def test_differences_are_set_against_both_uncertainties() -> None:
 def test_every_point_has_its_verdict_in_six_columns(page: ResultsPage, tmp_path: Path) -> None:
     told = {"alpha_2_predicted": 0.199, "alpha_2_predicted_uncertainty": 0.002, "agrees": True}
     parts = '{"laser_scale": 0.001, "clock": 0.0005}'
-    good = _point(16.0, 0.2).model_copy(update={**told, "uncertainty_parts": parts})
-    off = _point(17.0, 0.3).model_copy(update={**told, "agrees": False, "status": PointStatus.MODULATED})
-    page.show_file(_made(tmp_path / "wednesday", good, off, _point(18.0, None)))
+    good = point(16.0, 0.2).model_copy(update={**told, "uncertainty_parts": parts})
+    off = point(17.0, 0.3).model_copy(update={**told, "agrees": False, "status": PointStatus.MODULATED})
+    page.show_file(made(tmp_path / "wednesday", good, off, point(18.0, None)))
 
     def cells(row: int) -> list[str]:
         items = [page.table.item(row, column) for column in range(page.table.columnCount())]
@@ -134,20 +86,20 @@ def test_every_point_has_its_verdict_in_six_columns(page: ResultsPage, tmp_path:
 
 def test_the_verdict_of_the_run_is_above_its_points(page: ResultsPage, tmp_path: Path) -> None:
     told = {"alpha_2_predicted": 0.199, "alpha_2_predicted_uncertainty": 0.002, "agrees": True}
-    good = _point(16.0, 0.2).model_copy(update=told)
-    off = _point(17.0, 0.3).model_copy(update={**told, "agrees": False})
-    page.show_file(_made(tmp_path / "one", good))
+    good = point(16.0, 0.2).model_copy(update=told)
+    off = point(17.0, 0.3).model_copy(update={**told, "agrees": False})
+    page.show_file(made(tmp_path / "one", good))
     assert page.verdict.text().startswith("α₂ 0.2000 ± 0.0040 · predicted 0.1990 ± 0.0020")
     assert "✓ agrees" in page.verdict.text()
-    page.show_file(_made(tmp_path / "two", good, off, _point(18.0, None)))
+    page.show_file(made(tmp_path / "two", good, off, point(18.0, None)))
     expected = "1 of 2 compared results agree with the prediction · ▲ DISAGREES: α₂ at ω = 17 rad/s, β = 0.4"
     assert page.verdict.text() == expected
-    page.show_file(_made(tmp_path / "none", _point(18.0, None)))
+    page.show_file(made(tmp_path / "none", point(18.0, None)))
     assert page.verdict.isHidden()
 
 
 def test_a_file_has_the_figures_of_its_folder(page: ResultsPage, tmp_path: Path) -> None:
-    path = _made(tmp_path / "thursday", _point(16.0, 0.2))
+    path = made(tmp_path / "thursday", point(16.0, 0.2))
     image = QImage(200, 100, QImage.Format.Format_RGB32)
     image.fill(Qt.GlobalColor.red)
     image.save(str(path.with_name("gain_spectra.png")))
@@ -180,7 +132,7 @@ def test_a_run_that_ends_takes_nobodys_comparison_away(
     page: ResultsPage, files: tuple[Path, Path], tmp_path: Path
 ) -> None:
     page.show_file(files[0])
-    last = _made(tmp_path / "wednesday", _point(16.0, 0.22))
+    last = made(tmp_path / "wednesday", point(16.0, 0.22))
     page.show_end(Ended("completed", "the plan was carried out", {}, "", files[1].parent))
     assert [file.name for file in page.files.ticked] == ["tuesday"], "one file is no comparison"
     page.files.item(0).setCheckState(Qt.CheckState.Checked)
@@ -213,7 +165,7 @@ def test_a_stretch_has_the_extremes_of_its_samples(
     monkeypatch.setattr("bench.app.gui.history_view.CHUNK", 300)
     found = read_stretch(files[0], 2, "laser_1", begin, end, parts)
     first, last = max(round(begin * RATE), 0), min(round(end * RATE) + 1, N)
-    expected = 1e-6 * _counts(2)[first:last, 1]
+    expected = 1e-6 * counts(2)[first:last, 1]
     assert (found.values.min(), found.values.max()) == pytest.approx((expected.min(), expected.max()), rel=1e-6)
     assert found.time[0] == pytest.approx(first / RATE)
     assert found.time.size <= 2 * parts + 4
@@ -235,7 +187,7 @@ def test_samples_are_read_beside_the_window(page: ResultsPage, files: tuple[Path
     qtbot.waitUntil(
         lambda: view.shown is not None and (view.shown.begin, view.shown.unit) == (1.0, "m"), timeout=LONG_MS
     )
-    np.testing.assert_allclose(view.curve.getData()[1], 1e-3 * _counts(2)[1000:1101, 1], rtol=1e-6)
+    np.testing.assert_allclose(view.curve.getData()[1], 1e-3 * counts(2)[1000:1101, 1], rtol=1e-6)
 
 
 def test_export_and_report_are_those_of_the_command_line(
@@ -250,7 +202,7 @@ def test_export_and_report_are_those_of_the_command_line(
     qtbot.waitUntil(outputs.open_made.isVisible, timeout=LONG_MS)
     assert outputs.message.text() == texts.MADE.format(path=folder / "campaign-mat-2")
     made = next((folder / "campaign-mat-2").glob("*run*1*.mat"))
-    np.testing.assert_allclose(np.ravel(loadmat(made)["laser_1"]), 1e-6 * _counts(1)[:, 1], rtol=1e-9)
+    np.testing.assert_allclose(np.ravel(loadmat(made)["laser_1"]), 1e-6 * counts(1)[:, 1], rtol=1e-9)
     opened: list[QUrl] = []
     monkeypatch.setattr(QDesktopServices, "openUrl", opened.append)
     outputs.open_made.click()
