@@ -232,7 +232,7 @@ RUN_CUT_WHY = "its writer was killed or is no longer writing; `rockbench file re
 RUN_PASSED, RUN_NOT_PASSED = "✓ passed", "▲ NOT PASSED"
 RUN_RANGE = "{name} {low} to {high}{unit}, {n} values"
 RUN_AGREEING = "{agree} of {judged} agree"
-RUN_SPECIMEN = "{b:.3g} × {h:.3g} mm, k₁ {k:.4g} N/m, {how}"
+RUN_SPECIMEN = "{how}, {b:.3g} × {h:.3g} mm, k₁ {k:.4g} N/m"
 RUN_IDENTIFIED, RUN_ASSUMED = "identified", "assumed"
 RUNS, RUNS_SEARCH = "runs", "search: protocol, result, operator, date, folder, …"
 RUNS_SEARCH_TIP = "Shows only the runs with all of these words in any column or tooltip (Ctrl+F)."
@@ -248,6 +248,14 @@ RUNS_READING = "reading {n}"
 RUNS_NONE = "No data file in {folder}."
 RUNS_NO_FOLDER = "{folder} does not exist yet: the first run creates it."
 RUNS_UNREAD = "▲ {folder} cannot be read: {why}"
+USE, USE_CHOICE, USE_ITEM = "Use for the next run", "results for other runs", "{kind} ({name})"
+USE_TIP = (
+    "Uses this result instead of the configured one for all following runs, including those of the queue; the Setup "
+    "page shows the values (Ctrl+U). The configuration's file is not changed."
+)
+USE_BACK = "Configured values"
+USE_BACK_TIP = "Uses the values of the configuration again for all following runs (Ctrl+Shift+U)."
+USED = "From now on runs use {files}. Configured values returns to the configuration."
 
 WELCOME = (
     "Guided tour: this is the simulated bench; no hardware moves. The form contains one harmonic point, which runs as "
@@ -283,7 +291,7 @@ OPEN_SPECIMEN = "Open a specimen file …"
 OPEN_SPECIMEN_TIP = (
     "Uses identified parameters of the specimen instead of the assumed ones, like --specimen (Ctrl+Shift+P)."
 )
-IDENTIFIED = "Specimen: {path}"
+IDENTIFIED = "{kind}: {path}"
 CONFIGURATION_KEPT = "{text}. The current configuration stays in use."
 MUST_BE = "It must be {allowed}."
 FIND = "Search for devices"

@@ -33,6 +33,8 @@ from bench.app.gui.open_files import FileList, Place, read_file
 from bench.app.gui.outputs import Outputs
 from bench.app.gui.result_tables import read_only, show_differences, show_points
 from bench.app.gui.run_browser import RunBrowser
+from bench.app.gui.setup_page import SetupPage
+from bench.app.gui.use_result import UseResult
 from bench.app.gui.widgets import FITTING, ElidingLabel, ask_for_files, give_key, scrolling, set_level, why_no_dialog
 from bench.app.ipc.messages import Ended, Refused
 from bench.datafile.tables import Column
@@ -79,6 +81,7 @@ class ResultsPage(QWidget):
             read_only(texts.COMPARISON),
         )
         self.histories, self.outputs, self.figures = HistoryView(theme), Outputs(), FigureView()
+        self.reuse = UseResult(controller)
         self.everything = QCheckBox(texts.EVERYTHING)
         self.everything.setToolTip(texts.EVERYTHING_TIP)
         self.everything.setShortcut("Ctrl+Shift+F")
@@ -96,6 +99,13 @@ class ResultsPage(QWidget):
         self.gains.use_theme(theme)
         self.browser.use_theme(theme)
         self._draw()
+
+    def reuse_through(self, setup: SetupPage) -> None:
+        """Let the Setup page use results of runs."""
+        self.reuse.wanted.connect(setup.use_result)
+        self.reuse.returned.connect(setup.use_given)
+        setup.used.connect(self.reuse.show_used)
+        setup.refused.connect(self.reuse.show_refusal)
 
     def browse(self) -> None:
         """Show the list of all runs."""
@@ -163,6 +173,7 @@ class ResultsPage(QWidget):
         self.remove.setEnabled(file is not None)
         self.browser.back.setEnabled(file is not None)
         self.outputs.use(None if file is None else file.path)
+        self.reuse.use(None if file is None else file.path)
         self.histories.use(file)
         self.figures.use(None if file is None else file.path)
         self._list()
@@ -269,6 +280,7 @@ class ResultsPage(QWidget):
         rows.addWidget(self.verdict)
         rows.addWidget(self.message)
         rows.addWidget(whole, 1)
+        rows.addWidget(self.reuse)
         rows.addWidget(self.outputs)
         for each in (self.browser, self.view):
             self.views.addWidget(each)

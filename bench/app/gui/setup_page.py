@@ -23,9 +23,9 @@ from bench.app.gui.configuration_tree import ConfigurationTree
 from bench.app.gui.controller import Controller
 from bench.app.gui.recent_files import RecentFiles
 from bench.app.gui.widgets import FITTING, ask_for_files, give_key, ignore_wheel, scrolling, set_level, why_no_dialog
+from bench.app.result_use import UsableResult
 from bench.config.model import BenchConfiguration
-from bench.config.result_files import read_specimen
-from bench.config.toml import former_keys, read_configuration, with_identified
+from bench.config.toml import former_keys, read_configuration
 from sim.errors import RockbenchError
 
 
@@ -96,6 +96,10 @@ class SetupPage(QWidget):
 
     opened = Signal(object)
     """Emits the `BenchConfiguration` for the following runs."""
+    used = Signal(object)
+    """Emits the paths of the result files that the following runs use instead of the configured ones, by kind."""
+    refused = Signal(str)
+    """Emits why a result file is not used."""
 
     def __init__(
         self,
@@ -108,7 +112,7 @@ class SetupPage(QWidget):
         super().__init__()
         self._controller = controller
         self.configuration, self.path = configuration, path
-        self._specimen: Path | None = None
+        self._given, self._used = configuration, dict[str, Path]()
         self.source = QLabel(wordWrap=True)
         self.open_file, self.open_specimen = QPushButton(texts.OPEN_CONFIGURATION), QPushButton(texts.OPEN_SPECIMEN)
         self.recent = RecentFiles(settings)
@@ -138,18 +142,31 @@ class SetupPage(QWidget):
         except RockbenchError as error:
             self._say(f"▲ {texts.CONFIGURATION_KEPT.format(text=error)}", "alarm")
             return
-        self._specimen = None
+        self._given, self._used = configuration, {}
         self._use(configuration, path)
 
     def open_identified(self, path: Path) -> None:
-        """Use the identified specimen in a file; for an invalid file, show the reason and keep the current specimen."""
+        """Use the identified specimen in a file, as in `use_result`."""
+        self.use_result(UsableResult(path, "specimen"))
+
+    def use_result(self, result: UsableResult) -> None:
+        """Use a result of a run for the following runs; for an invalid file, show the reason and keep the current
+        configuration.
+        """
         try:
-            configuration = with_identified(self.configuration, read_specimen(path))
+            configuration = result.applied(self.configuration)
         except RockbenchError as error:
-            self._say(f"▲ {texts.CONFIGURATION_KEPT.format(text=error)}", "alarm")
+            text = texts.CONFIGURATION_KEPT.format(text=error)
+            self._say(f"▲ {text}", "alarm")
+            self.refused.emit(text)
             return
-        self._specimen = path
+        self._used[result.kind] = result.path
         self._use(configuration, self.path)
+
+    def use_given(self) -> None:
+        """Use no results of runs other than those of the configuration."""
+        self._used = {}
+        self._use(self._given, self.path)
 
     def use_theme(self, theme: Theme) -> None:
         self.loop.use_theme(theme)
@@ -158,11 +175,11 @@ class SetupPage(QWidget):
         self.configuration, self.path = configuration, path
         self._show()
         self.opened.emit(configuration)
+        self.used.emit(dict(self._used))
 
     def _show(self) -> None:
         lines = [f"{texts.CONFIGURATION}: {self.path or texts.VIRTUAL}"]
-        if self._specimen is not None:
-            lines.append(texts.IDENTIFIED.format(path=self._specimen))
+        lines += [texts.IDENTIFIED.format(kind=kind.capitalize(), path=path) for kind, path in self._used.items()]
         if self.path is not None:
             lines += former_keys(self.path)
         self._say("\n".join(lines), "calm")

@@ -210,6 +210,7 @@ class Window(QMainWindow):
         runner.troubled.connect(self.trouble.show_trouble)
         self.setup.opened.connect(self._configure)
         self.setup.sounds.toggled.connect(self._mute)
+        self.results.reuse_through(self.setup)
         # the points of the last run stay until a run begins; a plan check does not remove them
         for source in (runner, self.protocol, self.setup.loop):
             source.predicted.connect(self.run.predict)

@@ -85,6 +85,8 @@ class NoPlots(QWidget):
     def predict(self, prediction: object) -> None:
         self.predicted.append(prediction)
 
+    def reuse_through(self, setup: object) -> None: ...
+
 
 @pytest.fixture
 def without_plots(monkeypatch: pytest.MonkeyPatch) -> None:
