@@ -45,6 +45,14 @@ class Measured:
     field: str = ""
 
     @property
+    def score(self) -> float:
+        """Normalised error E_n: measured minus predicted over the root sum of squares of their expanded uncertainties.
+        NaN if one of them is missing.
+        """
+        combined = hypot(self.uncertainty, self.predicted_uncertainty)
+        return (self.value - self.predicted) / combined if combined > 0.0 else nan
+
+    @property
     def sentence(self) -> str:
         """The result as a sentence: value, prediction, verdict and point."""
         _, name, value, predicted, off, verdict = self.cells

@@ -197,7 +197,7 @@ DIFFERENCE_TIPS = (
 RECORD_POINT, SINE_POINT = "{record}, β = {beta:g}", "ω = {omega:g} rad/s, β = {beta:g}"
 WITHIN, BEYOND = "within", "▲ BEYOND"
 RUN, CHANNEL, WHOLE = "run", "channel", "Whole run"
-RUN_ITEM = "{number} ({seconds:.1f} s)"
+RUN_ITEM = "run {number}, {seconds:.0f} s"
 SINCE_ARMED = "seconds since the rig was armed"
 REPORT, EXPORT = "Create report", "Export"
 REPORT_TIP = (
@@ -255,7 +255,25 @@ USE_TIP = (
 )
 USE_BACK = "Configured values"
 USE_BACK_TIP = "Uses the values of the configuration again for all following runs (Ctrl+Shift+U)."
-USED = "From now on runs use {files}. Configured values returns to the configuration."
+USED = "Runs now use {files}. Configured values goes back."
+FURTHER, FURTHER_TIP = "and …", "Further channels, which are drawn over the first or, with another unit, below it."
+OVERLAY, OVERLAY_TIP = "ticked runs", "Draws the same channels of the same run of the other ticked files, too."
+CURSORS, CURSORS_TIP = "cursors", "Two cursors, A and B, to be dragged; the line below has the samples at both."
+SPECTRUM = "spectrum"
+SPECTRUM_TIP = (
+    "Amplitude spectrum of all samples in the visible range (Hann window, mean removed): the line of a sine has the "
+    "height of its amplitude. Missing samples are interpolated."
+)
+SPECTRUM_AXIS, AMPLITUDE = "frequency [Hz]", "amplitude"
+SPECTRUM_LONG = "a spectrum of the visible range takes too long: zoom in to at most {most:.0f} s"
+SPECTRUM_SHORT = "a spectrum takes at least {least} samples: zoom out"
+CURSOR_TIMES = "A {a:.4f} s, B {b:.4f} s, B − A {step:+.4f} s ({rate} Hz)"
+CURSOR_VALUES = "{name}: A {a}, B {b}, B − A {step} {unit}"
+SCORE, SCORES, SCORE_AXIS = "Eₙ", "normalised errors", "row of the table of points"
+SCORES_TIP = (
+    "Eₙ = (measured − predicted) / combined expanded uncertainty (k = 2) of each compared result. Between the dashed "
+    "lines at ±1 they agree."
+)
 
 WELCOME = (
     "Guided tour: this is the simulated bench; no hardware moves. The form contains one harmonic point, which runs as "

@@ -1,4 +1,4 @@
-"""The figures that a run wrote next to its data file."""
+"""The figures that a run wrote next to its data file, and its normalised errors below them."""
 
 from pathlib import Path
 
@@ -7,13 +7,16 @@ from PySide6.QtGui import QPixmap, QResizeEvent
 from PySide6.QtWidgets import QComboBox, QLabel, QSizePolicy, QVBoxLayout, QWidget
 
 from bench.app.display import texts
+from bench.app.display.theme import Theme
+from bench.app.gui.score_strip import ScoreStrip
 
 
 class FigureView(QWidget):
-    """One of the figures, as large as the space allows; selected by its name."""
+    """One of the figures, as large as the space allows, selected by its name; below it the strip of E_n."""
 
-    def __init__(self) -> None:
+    def __init__(self, theme: Theme) -> None:
         super().__init__()
+        self.scores = ScoreStrip(theme)
         self.choice, self.picture = QComboBox(), QLabel(alignment=Qt.AlignmentFlag.AlignCenter)
         self.choice.setAccessibleName(texts.FIGURE)
         self.picture.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Ignored)
@@ -23,6 +26,7 @@ class FigureView(QWidget):
         column.setContentsMargins(0, 0, 0, 0)
         column.addWidget(self.choice)
         column.addWidget(self.picture, 1)
+        column.addWidget(self.scores)
 
     def use(self, file: Path | None) -> None:
         """List the figures in the folder of this data file for selection."""

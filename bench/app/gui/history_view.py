@@ -1,174 +1,254 @@
-# pyright: reportUnknownMemberType=false, reportUnknownVariableType=false, reportUnknownArgumentType=false
-"""Plot of the samples of one channel of one run at screen resolution, reloaded after a zoom."""
+"""Samples of one or more channels at screen resolution, with cursors and the spectrum of the visible range."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
 from functools import partial
-from pathlib import Path
-from typing import Any
+from math import isfinite
+from typing import cast
 
 import numpy as np
-import pyqtgraph as pg
-from numpy.typing import NDArray
 from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import (
+    QCheckBox,
     QComboBox,
     QHBoxLayout,
-    QLabel,
+    QMenu,
     QPushButton,
+    QSplitter,
     QVBoxLayout,
     QWidget,
 )
 
 from bench.app.display import texts
+from bench.app.display.samples import DRIVE, Spectrum, Stretch, Track, read_spectra, read_stretches, read_values
 from bench.app.display.theme import Theme
 from bench.app.display.typography import in_screen_unit, label
+from bench.app.formatting import number
 from bench.app.gui.background import Reader
-from bench.app.gui.open_files import DRIVE, RunFile
-from bench.app.gui.widgets import colour_axes
-from bench.app.ipc.messages import extremes
-
-CHUNK = 1_000_000
-"""Number of rows read at a time, because an hour of samples does not fit into memory."""
-
+from bench.app.gui.open_files import RunFile
+from bench.app.gui.sample_plot import Line, SamplePlot
+from bench.app.gui.widgets import ElidingLabel
 
 PARTS = 1200
 """Number of parts of the visible range, with two points each."""
 SETTLE = 150
-"""Delay between a zoom and the reading of the file [ms]."""
-
-
-@dataclass(frozen=True, eq=False)
-class Stretch:
-    """Samples of a channel from `begin` to `end` [s] as a line through the minimum and the maximum of each of its
-    parts in turn. Both arrays have shape (n,); values are in the channel's unit.
-    """
-
-    time: NDArray[np.float64]
-    values: NDArray[np.float32]
-    channel: str
-    unit: str
-    begin: float
-    end: float
-
-
-def read_stretch(path: Path, run: int, channel: str, begin: float, end: float, parts: int) -> Stretch:
-    """Samples of channel `channel` of run `run` between two times [s] since the rig was armed, in at most `parts`
-    parts.
-
-    An interval with fewer than two samples per part is returned sample by sample. Raises RockbenchError.
-    """
-    from bench.datafile.reader import open_datafile
-
-    with open_datafile(path) as record:
-        rate = record.sample_rate
-        rows = next(each.rows for each in record.runs if each.number == run)
-        first = rows.start + min(max(int(begin * rate), 0), len(rows))
-        last = rows.start + min(max(int(np.ceil(end * rate)) + 1, 0), len(rows))
-        unit = "V" if channel == DRIVE else next(each.unit for each in record.channels if each.name == channel)
-        width = max((last - first) // max(parts, 1), 1)
-        lows, highs = [np.zeros(0, np.float32)], [np.zeros(0, np.float32)]
-        step = max(CHUNK // width, 1) * width
-        for at in range(first, last, step):
-            part = slice(at, min(at + step, last))
-            values = record.drive(part).astype(np.float64) if channel == DRIVE else record.values(channel, part)
-            low, high = extremes(values[:, None], width)
-            lows.append(low[:, 0])
-            highs.append(high[:, 0])
-    low, high = np.concatenate(lows), np.concatenate(highs)
-    time = (first - rows.start + width * np.arange(low.size, dtype=np.float64)) / rate
-    if width == 1:
-        return Stretch(time, low, channel, unit, begin, end)
-    return Stretch(np.repeat(time, 2), np.column_stack((low, high)).ravel(), channel, unit, begin, end)
+"""Delay between a zoom, or a move of a cursor, and the reading of the file [ms]."""
+MOST = 12
+"""Largest number of lines."""
+LEAST = 1e-12
+"""Smallest amplitude that is drawn, because the axis is logarithmic."""
 
 
 class HistoryView(QWidget):
-    """Plot of a channel; the wheel zooms in time, dragging pans, and a thread reads the file."""
+    """Plots of channels of a run, and of the same channels of the other ticked files. Threads read the files."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
         self._file: RunFile | None = None
-        self.shown: Stretch | None = None
-        self.run, self.channel = QComboBox(), QComboBox()
-        self.run.setAccessibleName(texts.RUN)
-        self.channel.setAccessibleName(texts.CHANNEL)
-        self.whole, self.message = QPushButton(texts.WHOLE), QLabel()
-        self._plot = plot = pg.PlotWidget(enableMenu=False)
-        plot.setAccessibleName(texts.NAMES["history"])
-        self._item: Any = plot.getPlotItem()
-        self._item.setMouseEnabled(x=True, y=False)
-        self._item.hideButtons()
-        self._item.showGrid(x=True, y=True, alpha=0.25)
-        self.curve: Any = self._item.plot()
-        self.use_theme(theme)
-        row = QHBoxLayout()
-        for name, choice in ((texts.RUN, self.run), (texts.CHANNEL, self.channel)):
-            row.addWidget(QLabel(name))
-            row.addWidget(choice)
-        row.addWidget(self.whole)
-        row.addWidget(self.message, 1)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.addLayout(row)
-        column.addWidget(plot, 1)
-        self._reader = Reader(self)
-        self._reader.found.connect(self._draw)
-        self._wait = QTimer(self, interval=SETTLE, singleShot=True)
+        self._others: Sequence[RunFile] = ()
+        self.shown: list[Stretch] = []
+        self.run, self.channel, self.further = QComboBox(), QComboBox(), QPushButton(texts.FURTHER)
+        self._menu = QMenu(self)
+        self.overlay = QCheckBox(texts.OVERLAY)
+        self.with_cursors, self.with_spectrum = QCheckBox(texts.CURSORS), QCheckBox(texts.SPECTRUM)
+        self.whole, self.message, self.reading = QPushButton(texts.WHOLE), ElidingLabel(), ElidingLabel()
+        self.plot = SamplePlot(theme, texts.SINCE_ARMED, "")
+        self.spectrum = SamplePlot(theme, texts.SPECTRUM_AXIS, texts.AMPLITUDE, log=True)
+        self._readers = [Reader(self) for _ in range(3)]
+        self._wait, self._probe = (QTimer(self, interval=SETTLE, singleShot=True) for _ in range(2))
+        self._arrange()
+        for reader, take in zip(self._readers, (self._draw, self._draw_spectrum, self._read_out), strict=True):
+            reader.found.connect(take)
         self._wait.timeout.connect(self.read)
+        self._probe.timeout.connect(self._read_cursors)
         self.run.currentIndexChanged.connect(self.show_whole)
-        self.channel.currentIndexChanged.connect(self.read)
+        self.channel.currentIndexChanged.connect(self._choose_channel)
         self.whole.clicked.connect(self.show_whole)
-        self._item.sigXRangeChanged.connect(self._look_closer)
+        self._menu.triggered.connect(self.read)
+        self.overlay.toggled.connect(self.read)
+        self.with_cursors.toggled.connect(self._show_cursors)
+        self.with_spectrum.toggled.connect(self._show_spectrum)
+        self.plot.range_changed.connect(self._wait.start)
+        self.plot.cursors_moved.connect(self._move_cursors)
+
+    @property
+    def tracks(self) -> list[Track]:
+        """The channels that are shown: those of the file, then those of the other ticked files that have them."""
+        file, row = self._file, self.run.currentIndex()
+        if file is None or row < 0 or self.channel.currentIndex() < 0:
+            return []
+        run = list(file.runs)[row]
+        names = [str(self.channel.currentData())]
+        names += [str(each.data()) for each in self._menu.actions() if each.isChecked() and each.data() not in names]
+        others = [each for each in self._others if each is not file] if self.overlay.isChecked() else []
+        found = [
+            Track(each.path, run, name, f"{each.name}: {label(name)}" if others else label(name))
+            for each in (file, *others)
+            for name in names
+            if name in each.channels and run in each.runs
+        ]
+        return found[:MOST]
 
     def use_theme(self, theme: Theme) -> None:
-        self._plot.setBackground(theme.raised)
-        colour_axes(self._item, theme)
-        self._item.setLabel("bottom", texts.SINCE_ARMED, color=theme.text)
-        self.curve.setPen(pg.mkPen(theme.lines[1], width=1))
+        """Use the colours of another theme."""
+        self.plot.use_theme(theme)
+        self.spectrum.use_theme(theme)
 
     def use(self, file: RunFile | None) -> None:
-        """Show the samples of this file."""
+        """Show the samples of this file, of the same channels as before where it has them."""
         self._file = file
-        kept = self.channel.currentData()
+        kept, checked = self.channel.currentData(), {each.data() for each in self._menu.actions() if each.isChecked()}
         for choice in (self.run, self.channel):
             choice.blockSignals(True)
             choice.clear()
+        self._menu.clear()
         if file is not None:
             self.run.addItems([texts.RUN_ITEM.format(number=run, seconds=length) for run, length in file.runs.items()])
             for name in file.channels:
                 self.channel.addItem(label(name), name)
+                action = self._menu.addAction(label(name))
+                action.setData(name)
+                action.setCheckable(True)
+                action.setChecked(name in checked)
             chosen = kept if kept in file.channels else next(iter(file.channels), DRIVE)
             self.channel.setCurrentIndex(self.channel.findData(chosen))
         for choice in (self.run, self.channel):
             choice.blockSignals(False)
-        self.curve.setData([], [])
-        self.shown = None
+        self.shown = []
+        self.plot.draw(())
+        self.spectrum.draw(())
+        self._choose_channel()
         self.show_whole()
 
+    def compare(self, files: Sequence[RunFile]) -> None:
+        """Offer the same channels of these files, which are ticked."""
+        self._others = files
+        self.overlay.setEnabled(len(files) > 1)
+        if self.overlay.isChecked():
+            self.read()
+
     def show_whole(self) -> None:
+        """Show the whole run."""
         if self._file is not None and self.run.currentIndex() >= 0:
             length = list(self._file.runs.values())[self.run.currentIndex()]
-            self._item.setXRange(0.0, max(length, 1e-3), padding=0.0)
+            self.plot.show_range(0.0, max(length, 1e-3))
             self._wait.stop()
             self.read()
 
     def read(self) -> None:
-        file = self._file
-        if file is None or self.run.currentIndex() < 0 or self.channel.currentIndex() < 0:
-            return
-        (begin, end), _ = self._item.viewRange()
-        run = list(file.runs)[self.run.currentIndex()]
-        self._reader.call(partial(read_stretch, file.path, run, str(self.channel.currentData()), begin, end, PARTS))
+        """Read the visible range."""
+        if tracks := self.tracks:
+            begin, end = self.plot.visible
+            self._readers[0].call(partial(read_stretches, tracks, begin, end, PARTS))
+            if self.with_spectrum.isChecked():
+                self._readers[1].call(partial(read_spectra, tracks, begin, end))
+            self._probe.start()
 
-    def _look_closer(self) -> None:
-        self._wait.start()
+    def _choose_channel(self) -> None:
+        for action in self._menu.actions():
+            action.setEnabled(action.data() != self.channel.currentData())
+        self.read()
+
+    def _show_cursors(self, on: bool) -> None:
+        self.plot.show_cursors(on=on)
+
+    def _show_spectrum(self, on: bool) -> None:
+        self.spectrum.setVisible(on)
+        self.read()
 
     def _draw(self, found: object) -> None:
-        if not isinstance(found, Stretch):
-            self.message.setText(f"▲ {found}")
+        if not self._failed(found):
+            self.shown = cast("list[Stretch]", found)
+            lines = list[Line]()
+            for each in self.shown:
+                factor, unit = in_screen_unit(each.unit)
+                lines.append(Line(each.track.name, unit, each.time, factor * each.values))
+            self.plot.draw(lines)
+
+    def _draw_spectrum(self, found: object) -> None:
+        if self._failed(found):
+            self.spectrum.draw(())
             return
-        self.shown = found
-        self.message.setText("")
-        factor, unit = in_screen_unit(found.unit)
-        self._item.setLabel("left", f"{label(found.channel)} [{unit}]")
-        self.curve.setData(found.time, factor * found.values, connect="finite")
-        self._item.enableAutoRange(axis="y")
+        lines = list[Line]()
+        for each in cast("list[Spectrum]", found):
+            factor, unit = in_screen_unit(each.unit)
+            lines.append(Line(each.track.name, unit, each.frequency, np.maximum(factor * each.amplitude, LEAST)))
+        self.spectrum.draw(lines)
+        if lines:
+            self.spectrum.show_range(0.0, max(float(line.x[-1]) for line in lines))
+
+    def _failed(self, found: object) -> bool:
+        failed = isinstance(found, Exception)
+        self.message.setText(f"▲ {found}" if failed else "")
+        self.message.setVisible(failed)
+        return failed
+
+    def _move_cursors(self) -> None:
+        cursors = self.plot.cursors
+        self.reading.setVisible(cursors is not None)
+        if cursors is not None:
+            self.reading.setText(_times(*cursors))
+            self._probe.start()
+
+    def _read_cursors(self) -> None:
+        if self.plot.cursors is not None and (tracks := self.tracks):
+            self._readers[2].call(partial(_probed, tracks, self.plot.cursors))
+
+    def _read_out(self, found: object) -> None:
+        if self._failed(found) or self.plot.cursors is None:
+            return
+        tracks, cursors, values = cast("tuple[list[Track], tuple[float, float], list[list[float]]]", found)
+        parts = [_times(*cursors)]
+        units = dict[str, str]() if self._file is None else self._file.channels
+        for track, (first, second) in zip(tracks, values, strict=True):
+            factor, unit = in_screen_unit(units.get(track.channel, ""))
+            a, b = (number(factor * value) for value in (first, second))
+            step = f"{factor * (second - first):+.4g}" if isfinite(second - first) else texts.NO_VALUE
+            parts.append(texts.CURSOR_VALUES.format(name=track.name, a=a, b=b, step=step, unit=unit))
+        self.reading.setText(" · ".join(parts))
+
+    def _arrange(self) -> None:
+        self.run.setAccessibleName(texts.RUN)
+        self.channel.setAccessibleName(texts.CHANNEL)
+        self.plot.setAccessibleName(texts.NAMES["history"])
+        self.spectrum.setAccessibleName(texts.SPECTRUM)
+        self.further.setMenu(self._menu)
+        for part, tip in (
+            (self.further, texts.FURTHER_TIP),
+            (self.overlay, texts.OVERLAY_TIP),
+            (self.with_cursors, texts.CURSORS_TIP),
+            (self.with_spectrum, texts.SPECTRUM_TIP),
+        ):
+            part.setToolTip(tip)
+        self.overlay.setEnabled(False)
+        row = QHBoxLayout()
+        for part in (
+            *(self.run, self.channel, self.further, self.overlay),
+            *(self.with_cursors, self.with_spectrum, self.whole),
+        ):
+            row.addWidget(part)
+        row.addStretch(1)
+        plots = QSplitter()
+        plots.setChildrenCollapsible(False)
+        for part in (self.plot, self.spectrum):
+            plots.addWidget(part)
+        plots.setSizes([600, 400])
+        for part in (self.spectrum, self.reading, self.message):
+            part.hide()
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.addLayout(row)
+        column.addWidget(plots, 1)
+        column.addWidget(self.reading)
+        column.addWidget(self.message)
+
+
+def _probed(
+    tracks: list[Track], cursors: tuple[float, float]
+) -> tuple[list[Track], tuple[float, float], list[list[float]]]:
+    return tracks, cursors, read_values(tracks, cursors)
+
+
+def _times(first: float, second: float) -> str:
+    step = second - first
+    rate = number(1.0 / abs(step)) if step else texts.NO_VALUE
+    return texts.CURSOR_TIMES.format(a=first, b=second, step=step, rate=rate)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from bench.app.display import texts
 from bench.app.display.buffers import Ring
+from bench.app.display.samples import amplitude_spectrum
 from bench.app.display.theme import Theme
 from bench.app.gui.widgets import colour_axes
 from bench.app.ipc.messages import TRACES
@@ -30,15 +31,6 @@ motion within a bin.
 """
 _DRIFT = TRACES.index("drift")
 _T, _U1, _U2 = (TWIN_TRACE.index(name) for name in ("seconds", "u1", "u2"))
-
-
-def spectrum(time: NDArray[np.float64], drift: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Frequencies [Hz] and amplitudes of equally spaced samples of the drift, in their unit, both of shape (n,). The
-    line of a sine has the height of the sine's amplitude (Hann window).
-    """
-    window = np.hanning(drift.size)
-    lines: NDArray[np.float64] = np.abs(np.fft.rfft((drift - drift.mean()) * window)) * 2.0 / window.sum()
-    return np.asarray(np.fft.rfftfreq(drift.size, float(time[1] - time[0])), dtype=np.float64), lines
 
 
 def stroboscopic(time: NDArray[np.float64], values: NDArray[np.float64], omega: float) -> NDArray[np.float64]:
@@ -101,7 +93,7 @@ class MotionPlot(pg.PlotWidget):
         if time.size < 64:
             return
         if self.kind == "spectrum":
-            self._line.setData(*spectrum(time, drift))
+            self._line.setData(*amplitude_spectrum(time, drift))
             return
         speed = np.gradient(np.convolve(drift, SMOOTH, "same"), time)
         if self.kind == "phase":

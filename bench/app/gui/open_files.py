@@ -16,12 +16,11 @@ from PySide6.QtWidgets import (
 from bench.app.catalogue import load_protocol
 from bench.app.display import texts
 from bench.app.display.gains import mark_of
+from bench.app.display.samples import DRIVE
 from bench.app.formatting import clock
 from bench.datafile.tables import Column, Table
 from bench.document.typography import moment
 from sim.errors import RockbenchError
-
-DRIVE = "drive"
 
 
 @dataclass(frozen=True, eq=False)

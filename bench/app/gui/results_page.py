@@ -80,7 +80,7 @@ class ResultsPage(QWidget):
             read_only(texts.POINTS),
             read_only(texts.COMPARISON),
         )
-        self.histories, self.outputs, self.figures = HistoryView(theme), Outputs(), FigureView()
+        self.histories, self.outputs, self.figures = HistoryView(theme), Outputs(), FigureView(theme)
         self.reuse = UseResult(controller)
         self.everything = QCheckBox(texts.EVERYTHING)
         self.everything.setToolTip(texts.EVERYTHING_TIP)
@@ -97,6 +97,7 @@ class ResultsPage(QWidget):
         """Use the colours of another theme."""
         self.histories.use_theme(theme)
         self.gains.use_theme(theme)
+        self.figures.scores.use_theme(theme)
         self.browser.use_theme(theme)
         self._draw()
 
@@ -188,7 +189,9 @@ class ResultsPage(QWidget):
         points = [] if file is None else file.points
         labels: Mapping[str, str] = {} if file is None else file.labels
         show_points(self.table, results, points, labels, everything=self.everything.isChecked())
-        verdict = summary_of(rows_of(results, points, labels))
+        rows = rows_of(results, points, labels)
+        self.figures.scores.use(rows)
+        verdict = summary_of(rows)
         self.verdict.setText(verdict)
         self.verdict.setVisible(bool(verdict))
 
@@ -196,6 +199,7 @@ class ResultsPage(QWidget):
         """Draw the gains of all ticked files, with the predicted lines of the first."""
         files = self.files.ticked
         self.browser.compare([file.path for file in files])
+        self.histories.compare(files)
         self.gains.predict(files[0].prediction if files else {})
         for run, file in enumerate(files):
             self.gains.add_all(file.points, run, file.name if len(files) > 1 else "")

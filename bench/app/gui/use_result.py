@@ -51,7 +51,7 @@ class UseResult(QWidget):
     def show_used(self, used: Mapping[str, Path]) -> None:
         """Show the files that the next run uses, by kind."""
         self._used = used
-        files = ", ".join(f"{kind} {path.absolute()}" for kind, path in used.items())
+        files = ", ".join(f"{kind} {path.absolute().parent.name}/{path.name}" for kind, path in used.items())
         self._say(texts.USED.format(files=files) if files else "", "good")
         self._refresh()
 

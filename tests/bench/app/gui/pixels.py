@@ -85,6 +85,12 @@ def main(width: int, height: int, theme: str) -> int:
         wrong += [f"{window.pages.tabText(number)}: {each}" for each in clipped(window)]
         if len(sys.argv) > 4:
             window.grab().save(f"{sys.argv[4]}-{width}-{scale:g}-{theme}-{number}.png")
+    window.results.show_run()
+    for part in range(window.results.parts.count()):
+        window.results.parts.setCurrentIndex(part)
+        for _ in range(3):
+            application.processEvents()
+        wrong += [f"{window.results.parts.tabText(part)}: {each}" for each in clipped(window)]
     print("\n".join(wrong))
     window.leave()
     return len(wrong)

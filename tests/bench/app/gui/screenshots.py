@@ -118,7 +118,7 @@ def take(folder: Path) -> None:
             results.parts.setCurrentWidget(results.histories)
             results.histories.run.setCurrentIndex(results.histories.run.count() - 1)
             results.histories.channel.setCurrentText("laser 2")
-            until(lambda: (shown := results.histories.shown) is not None and shown.channel == "laser_2")  # noqa: B023
+            until(lambda: [each.track.channel for each in results.histories.shown] == ["laser_2"])  # noqa: B023
             picture("samples")
             fill(window)
             picture("queue")

@@ -13,10 +13,11 @@ from pytestqt.qtbot import QtBot
 from bench.app.catalogue import load_protocol
 from bench.app.display.campaign import Campaign
 from bench.app.display.meters import Meter, meters_of
+from bench.app.display.samples import amplitude_spectrum
 from bench.app.display.verdict import verdict_of
 from bench.app.gui.controller import Controller
 from bench.app.gui.log_panel import LogPanel
-from bench.app.gui.motion_plot import spectrum, stroboscopic
+from bench.app.gui.motion_plot import stroboscopic
 from bench.app.gui.verdict import LARGEST, VerdictLabel
 from bench.app.run_display import Notice
 from bench.config.model import BenchConfiguration
@@ -164,7 +165,7 @@ def test_a_spectrum_has_the_amplitude_of_a_sine_and_a_section_one_point_of_it() 
     time = np.arange(10_000, dtype=np.float64) * 0.002
     omega = 2.0 * np.pi * 2.5
     drift: NDArray[np.float64] = 3.0 * np.sin(omega * time + 0.3)
-    frequency, lines = spectrum(time, drift)
+    frequency, lines = amplitude_spectrum(time, drift)
     assert frequency[lines.argmax()] == pytest.approx(2.5, abs=0.05)
     assert lines.max() == pytest.approx(3.0, rel=0.01)
     section = stroboscopic(time, np.column_stack((drift, time)), omega)

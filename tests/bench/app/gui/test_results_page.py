@@ -15,12 +15,11 @@ from bench.app.display import texts
 from bench.app.display.gains import compare
 from bench.app.display.theme import LIGHT
 from bench.app.gui.controller import Controller
-from bench.app.gui.history_view import read_stretch
 from bench.app.gui.outputs import free
 from bench.app.gui.results_page import ResultsPage
 from bench.app.ipc.messages import Ended
 from protocols.harmonic.protocol import PointStatus
-from tests.bench.app.gui.run_files import RATE, N, counts, made, point
+from tests.bench.app.gui.run_files import counts, made, point
 from tests.patience import LONG_MS
 
 
@@ -112,6 +111,26 @@ def test_a_file_has_the_figures_of_its_folder(page: ResultsPage, tmp_path: Path)
     assert page.figures.picture.text() == texts.NO_FIGURE
 
 
+def test_the_normalised_errors_are_below_the_figure(page: ResultsPage, tmp_path: Path) -> None:
+    told = {"alpha_2_predicted": 0.199, "alpha_2_predicted_uncertainty": 0.003, "agrees": True}
+    good = point(16.0, 0.2).model_copy(update=told)
+    off = point(17.0, 0.189).model_copy(update={**told, "agrees": False})
+    page.show_file(made(tmp_path / "scored", point(15.0, 0.3), good, off, point(18.0, None)))
+    page.show_run()
+    page.parts.setCurrentWidget(page.figures)
+    strip = page.figures.scores
+    assert strip.isVisible()
+    # 3-4-5: the combined uncertainty is 0.005; the first point has no prediction, the last one no value
+    assert [(row, score) for row, score, _ in strip.scores] == [(2, pytest.approx(0.2)), (3, pytest.approx(-2.0))]
+    assert strip.scores[1][2] == "3: α₂, ω = 17 rad/s, β = 0.4: Eₙ = -2"
+    assert list(strip._points.getData()[1]) == [pytest.approx(0.2), pytest.approx(-2.0)]
+    assert strip._item.viewRange()[1][0] < -2.0
+    cells = [page.table.item(row - 1, 0).text() for row, _, _ in strip.scores]
+    assert cells == ["ω = 16 rad/s, β = 0.4", "ω = 17 rad/s, β = 0.4"]
+    page.show_file(made(tmp_path / "alone", point(15.0, 0.3)))
+    assert strip.isHidden()
+
+
 def test_two_files_are_drawn_together_and_compared(page: ResultsPage, files: tuple[Path, Path]) -> None:
     for path in files:
         page.show_file(path)
@@ -153,41 +172,6 @@ def test_a_path_may_be_typed_and_a_wrong_one_changes_nothing(page: ResultsPage, 
     page.path.returnPressed.emit()
     assert "there is no such file" in page.message.text()
     assert page.files.count() == 1
-
-
-@pytest.mark.parametrize(
-    ("begin", "end", "parts"), [(0.0, 4.0, 7), (1.0, 1.2, 50), (-1.0, 9.0, 4000), (0.5, 0.52, 400)]
-)
-def test_a_stretch_has_the_extremes_of_its_samples(
-    files: tuple[Path, Path], begin: float, end: float, parts: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Against the counts as they were made."""
-    monkeypatch.setattr("bench.app.gui.history_view.CHUNK", 300)
-    found = read_stretch(files[0], 2, "laser_1", begin, end, parts)
-    first, last = max(round(begin * RATE), 0), min(round(end * RATE) + 1, N)
-    expected = 1e-6 * counts(2)[first:last, 1]
-    assert (found.values.min(), found.values.max()) == pytest.approx((expected.min(), expected.max()), rel=1e-6)
-    assert found.time[0] == pytest.approx(first / RATE)
-    assert found.time.size <= 2 * parts + 4
-    assert found.unit == "m"
-    if (last - first) < 2 * parts:
-        np.testing.assert_allclose(found.values, expected, rtol=1e-6)
-
-
-def test_samples_are_read_beside_the_window(page: ResultsPage, files: tuple[Path, Path], qtbot: QtBot) -> None:
-    page.show_file(files[0])
-    view = page.histories
-    # a laser's counts are micrometres, shown in millimetres
-    view.run.setCurrentIndex(1)
-    view.channel.setCurrentText("drive")
-    qtbot.waitUntil(lambda: view.shown is not None and view.shown.unit == "V", timeout=LONG_MS)
-    np.testing.assert_allclose(view.curve.getData()[1], 0.2, rtol=1e-6)
-    view.channel.setCurrentText("laser 1")
-    view._item.setXRange(1.0, 1.1, padding=0.0)
-    qtbot.waitUntil(
-        lambda: view.shown is not None and (view.shown.begin, view.shown.unit) == (1.0, "m"), timeout=LONG_MS
-    )
-    np.testing.assert_allclose(view.curve.getData()[1], 1e-3 * counts(2)[1000:1101, 1], rtol=1e-6)
 
 
 def test_export_and_report_are_those_of_the_command_line(

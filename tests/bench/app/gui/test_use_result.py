@@ -67,7 +67,7 @@ def test_every_result_of_a_run_can_be_used_and_given_back(window: Window, run: P
     assert used.calibrated is not None
     assert used.calibrated.laser_1 == CURVE
     for name in ("specimen.json", "table_model.json", "laser_calibration.json"):
-        assert str(run.with_name(name)) in reuse.message.text()
+        assert f"identified/{name}" in reuse.message.text()
         assert str(run.with_name(name)) in setup.source.text()
     assert window.runner.configuration is used
     window.protocol.check_plan()
