@@ -220,6 +220,9 @@ class HistoryView(QWidget):
         ):
             part.setToolTip(tip)
         self.overlay.setEnabled(False)
+        # the row fits a screen of 1024 px
+        for button in (self.further, self.whole):
+            button.setProperty("tight", "yes")
         row = QHBoxLayout()
         for part in (
             *(self.run, self.channel, self.further, self.overlay),

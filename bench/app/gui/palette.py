@@ -46,6 +46,7 @@ def style_sheet(theme: Theme) -> str:
     return f"""
     * {{ font-size: {BASE}pt; }}
     QPushButton {{ min-height: 32px; padding: 2px 14px; }}
+    QPushButton[tight="yes"] {{ padding: 2px 6px; }}
     QLineEdit, QComboBox {{ min-height: 26px; }}
     QTabBar::tab {{ min-height: 32px; min-width: 76px; }}
     QTabWidget#motion QTabBar::tab {{ min-height: 24px; min-width: 40px; padding: 0px 6px; }}

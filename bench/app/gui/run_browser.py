@@ -79,7 +79,7 @@ class RunBrowser(QWidget):
         self.choose, self.back = QPushButton(texts.RUNS_FOLDER), QPushButton(texts.RUNS_BACK)
         self.message, self.table = ElidingLabel(), _Table()
         self._unread = list[Found]()
-        self._problem, self._compared = "", list[str]()
+        self._problem, self._compared = "", list[Path]()
         self._current: Path | None = None
         self._reader, self._watch = Reader(self), QFileSystemWatcher(self)
         self._again = QTimer(self, interval=AGAIN)
@@ -111,6 +111,7 @@ class RunBrowser(QWidget):
     def use_folder(self, folder: Path) -> None:
         """List the runs of another folder."""
         self.folder = folder
+        self._mark()
         self.look()
 
     def look(self) -> None:
@@ -125,8 +126,8 @@ class RunBrowser(QWidget):
 
     def compare(self, compared: Sequence[Path]) -> None:
         """Show which runs are compared, the reference first."""
-        self.model.compare(compared)
-        self._compared = [each.resolve().parent.name for each in compared]
+        self._compared = [each.resolve() for each in compared]
+        self._mark()
         self._say()
 
     def warn(self, problem: str) -> None:
@@ -161,6 +162,12 @@ class RunBrowser(QWidget):
             self._reader.call(partial(read_rows, self._unread))
         self._say()
 
+    def _mark(self) -> None:
+        """Mark the compared runs under the names that the list has for them."""
+        real = self.folder.resolve()
+        inside = [(each, each.is_relative_to(real)) for each in self._compared]
+        self.model.compare([self.folder / path.relative_to(real) if own else path for path, own in inside])
+
     def _fail(self, error: Exception) -> None:
         self._unread = self.model.use([])
         absent = isinstance(error, FileNotFoundError)
@@ -177,7 +184,7 @@ class RunBrowser(QWidget):
         shown, every, folder = len(self.model.shown), self.model.all, self.folder.absolute()
         parts = [texts.RUNS_COUNT.format(shown=shown, all=every, folder=folder)]
         if len(self._compared) > 1:
-            parts.insert(0, texts.RUNS_REFERENCE.format(name=self._compared[0], n=len(self._compared) - 1))
+            parts.insert(0, texts.RUNS_REFERENCE.format(name=self._compared[0].parent.name, n=len(self._compared) - 1))
         if self._unread:
             parts.append(texts.RUNS_READING.format(n=len(self._unread)))
         text = " · ".join(parts) if every else texts.RUNS_NONE.format(folder=folder)

@@ -112,9 +112,8 @@ class RunModel(QAbstractTableModel):
         self.arrange()
 
     def compare(self, compared: Sequence[Path]) -> None:
-        """Mark the runs of the comparison, the reference first."""
-        paths = [each.resolve() for each in compared]
-        self._compared, self._reference = frozenset(paths), paths[0] if paths else None
+        """Mark the runs of the comparison, the reference first; paths are those of the listed files."""
+        self._compared, self._reference = frozenset(compared), compared[0] if compared else None
         self._repaint()
 
     def arrange(self) -> None:
@@ -136,7 +135,7 @@ class RunModel(QAbstractTableModel):
         if self._column == DATE:
             return (began,)
         if self._column == CHOICE:
-            return (path.resolve() in self._compared, began)
+            return (path in self._compared, began)
         return ("" if row is None else row.cells[self._column - 1].lower(), began)
 
     def rowCount(self, parent: Index = NOWHERE) -> int:
@@ -170,8 +169,8 @@ class RunModel(QAbstractTableModel):
             case Qt.ItemDataRole.DecorationRole if column == CHOICE:
                 return self._picture(row)
             case Qt.ItemDataRole.CheckStateRole if column == CHOICE and row is not None and row.usable:
-                return Qt.CheckState.Checked if path.resolve() in self._compared else Qt.CheckState.Unchecked
-            case Qt.ItemDataRole.FontRole if path.resolve() == self._reference:
+                return Qt.CheckState.Checked if path in self._compared else Qt.CheckState.Unchecked
+            case Qt.ItemDataRole.FontRole if path == self._reference:
                 font = QFont()
                 font.setBold(True)
                 return font

@@ -91,7 +91,7 @@ def test_a_row_has_the_result_the_specimen_and_the_origin_of_a_run(page: Results
     protocol, status, result, specimen, operator, _, folder = _cells(browser, "monday")
     assert (protocol, status, operator, folder) == ("harmonic", "completed", "A. Meyer", "monday")
     assert result == "α₂ 0.2000 ± 0.0040 · ✓ agrees · ω = 16 rad/s, β = 0.4"
-    assert specimen == "50 × 400 mm, k₁ 213.4 N/m, assumed"
+    assert specimen == "assumed, 50 × 400 mm, k₁ 213.4 N/m"
     assert _cells(browser, "tuesday")[2] == "α₂ 0.2120 to 0.3100, 2 values"
     tip = browser.model.index(_names(browser).index("tuesday"), 3).data(Qt.ItemDataRole.ToolTipRole)
     assert tip.endswith("rain")
