@@ -107,12 +107,6 @@ class SamplePlot(pg.GraphicsLayoutWidget):
         self._place_cursors()
         self.cursors_moved.emit()
 
-    def move_cursors(self, first: float, second: float) -> None:
-        """Move both cursors."""
-        self._cursors = (first, second)
-        self._place_cursors()
-        self.cursors_moved.emit()
-
     def _lay_out(self, units: Sequence[str]) -> None:
         kept = self.visible if self.plots else None
         self._layout.clear()

@@ -164,6 +164,18 @@ def test_a_run_is_opened_ticked_and_made_the_reference(page: ResultsPage, qtbot:
     assert page.views.currentWidget() is page.view
 
 
+def test_one_key_leads_to_the_list_and_back(page: ResultsPage, qtbot: QtBot) -> None:
+    with qtbot.waitActive(page):
+        page.activateWindow()
+    qtbot.keyClick(page, Qt.Key.Key_F, Qt.KeyboardModifier.ControlModifier)
+    qtbot.keyClicks(page.browser.search, "meyer")
+    assert _names(page.browser) == ["monday"]
+    page._open_run(page.browser.model.shown[0])
+    for view in (page.browser, page.view, page.browser):
+        qtbot.keyClick(page, Qt.Key.Key_B, Qt.KeyboardModifier.ControlModifier)
+        assert page.views.currentWidget() is view
+
+
 def test_the_list_follows_a_run_in_progress_without_disturbing_it(
     page: ResultsPage, qtbot: QtBot, tmp_path: Path
 ) -> None:
