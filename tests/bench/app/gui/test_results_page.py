@@ -38,6 +38,7 @@ def page(qtbot: QtBot) -> ResultsPage:
     shown = ResultsPage(controller, LIGHT)
     qtbot.addWidget(shown)
     shown.resize(1200, 700)
+    shown.show_run()
     shown.show()
     shown.destroyed.connect(controller.close)
     return shown
