@@ -6,9 +6,10 @@ import sys
 import tempfile
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from threading import Lock, Thread
 from typing import IO
 
-from PySide6.QtCore import QObject, QThreadPool, QTimer, Signal
+from PySide6.QtCore import QObject, QTimer, Signal
 
 from sim.errors import RockbenchError
 
@@ -31,18 +32,31 @@ class Reader(QObject):
 
     def __init__(self, parent: QObject) -> None:
         super().__init__(parent)
-        self._pool = QThreadPool(self)
-        self._pool.setMaxThreadCount(1)
         self._latest = 0
+        self._lock = Lock()
+        self._waiting: tuple[int, Callable[[], object]] | None = None
+        self._busy = False
         self._done.connect(self._tell)
 
     def call(self, function: Callable[[], object]) -> None:
         """Schedule a call of `function`; earlier calls that have not started are dropped."""
         self._latest += 1
-        number = self._latest
-        self._pool.clear()
+        with self._lock:
+            self._waiting = (self._latest, function)
+            if self._busy:
+                return
+            self._busy = True
+        # a pool of Qt waits for its threads when it is deleted, for ever if the window's thread holds Python's lock
+        Thread(target=self._work, daemon=True).start()
 
-        def work() -> None:
+    def _work(self) -> None:
+        while True:
+            with self._lock:
+                if self._waiting is None:
+                    self._busy = False
+                    return
+                number, function = self._waiting
+                self._waiting = None
             try:
                 answer: object = function()
             except Exception as error:
@@ -51,8 +65,6 @@ class Reader(QObject):
             # the window may have been closed
             with suppress(RuntimeError):
                 self._done.emit(number, answer)
-
-        self._pool.start(work)
 
     def _tell(self, number: int, answer: object) -> None:
         if number == self._latest:
