@@ -1,7 +1,7 @@
 """Makes every block, quoted result and picture of the pages again: `python -m tests.pages [PAGE ...] [--write]`.
 
-Without arguments all pages, about twenty minutes. What differs from its page is printed, and the exit code is then 1; with
-`--write` pictures are replaced by the ones that were made.
+Without arguments all pages, about twenty minutes. What differs from its page is printed, and the exit code is then 1;
+with `--write` pictures are replaced by the ones that were made.
 """
 
 import argparse

@@ -136,13 +136,15 @@ def completion(
     root = rockbench_app()
 
     try:
-        if install:
-            print(f"{root.install_completion(shell=shell)} written; open a new shell")
-        else:
-            print(root.generate_completion(shell=shell))
+        printed = (
+            f"{root.install_completion(shell=shell)} written; open a new shell"
+            if install
+            else root.generate_completion(shell=shell)
+        )
     except ShellDetectionError:
         raise InvalidInput("SHELL", "none", "the running shell was not recognised; specify bash, zsh or fish") from None
     except OSError as error:
         where = "its start-up file" if error.filename is None else Path(error.filename)
         raise InvalidInput("--install", str(where), f"the file cannot be written: {error.strerror}") from None
+    print(printed)
     return 0

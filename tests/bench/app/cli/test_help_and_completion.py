@@ -1,9 +1,11 @@
 """Every help ends with an example that parses; shells complete commands and options."""
 
+import os
 import shlex
 import shutil
 import subprocess
 from inspect import getdoc
+from io import FileIO, TextIOWrapper
 from pathlib import Path
 from pkgutil import resolve_name
 
@@ -120,3 +122,14 @@ def test_a_home_that_cannot_be_written_is_refused(
         monkeypatch.setenv(name, str(file))
     assert main(["completion", "fish", "--install"]) == 2
     assert capsys.readouterr().err.startswith("rockbench: error: --install = ")
+
+
+def test_a_reader_that_has_closed_the_pipe_is_not_a_file_that_cannot_be_written(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    reader, writer = os.pipe()
+    os.close(reader)
+    with FileIO(writer, "w") as raw:
+        monkeypatch.setattr("sys.stdout", TextIOWrapper(raw, encoding="utf-8", write_through=True))
+        with pytest.raises(BrokenPipeError):
+            main(["completion", "bash"])
