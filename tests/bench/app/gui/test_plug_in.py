@@ -24,7 +24,6 @@ from tests.patience import LONG_MS
 @pytest.fixture
 def window(qtbot: QtBot, qapp: QApplication, tmp_path: Path) -> Generator[Window]:
     """The window with the protocols of the project and the installed one, which its sessions find as well."""
-    before = qapp.styleSheet()
     dress(qapp, LIGHT)
     with example(tmp_path / "site", "tone_sweep"):
         entries = (*PROTOCOLS, load_protocol("tone-sweep"))
@@ -33,7 +32,6 @@ def window(qtbot: QtBot, qapp: QApplication, tmp_path: Path) -> Generator[Window
         shown.show()
         yield shown
         shown.leave()
-    qapp.setStyleSheet(before)
 
 
 def test_its_form_its_run_and_its_live_number(window: Window, qtbot: QtBot, tmp_path: Path) -> None:
