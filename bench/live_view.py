@@ -1,7 +1,8 @@
-"""Live view of a run: what the window shows below the verdict, declared by the protocol as one function.
+"""Live view of a run: the plots and lists below the verdict in the window, declared by the protocol as one function.
 
-The function receives a `LiveRun`, what the run has published so far, and returns the parts of the view, mostly `Panel`.
-It is called before the first result, when the parts show predictions and state what will appear, and after each result.
+The function receives a `LiveRun` with the events of the run up to now, and returns the parts of the view, mostly
+`Panel` objects. It is called before the first result, when the parts show predictions and announce the results, and
+after each result.
 """
 
 from collections import deque
@@ -23,9 +24,11 @@ Array = NDArray[np.float64]
 E = TypeVar("E", bound=Event)
 
 FITS, KEPT = 60, 2000
-"""Largest numbers of kept fits, which contain recordings, and of kept events of any other kind but points."""
+"""Largest number of stored fits, which contain recordings, and of stored events of each other type. All points are
+stored.
+"""
 MOST = 6
-"""Largest number of curves of a fit in a panel."""
+"""Largest number of curves that a panel shows of one fit."""
 DERIVED = ("residual", "uncertainty")
 """Suffixes of the names of series of a fit that are not drawn."""
 FITTED = "fitted"
@@ -38,7 +41,9 @@ Style: TypeAlias = Literal["line", "points", "predicted", "reference"]
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """A curve in SI units; `x`, `y` and the expanded uncertainties `spread`, if any, have the shape (n,)."""
+    """A curve in the units of its panel; `x`, `y` and `spread`, the expanded uncertainties of `y` if known, have shape
+    (n,).
+    """
 
     name: str
     x: Array
@@ -54,10 +59,12 @@ class Curve:
 
 @dataclass(eq=False)
 class Panel:
-    """Axes with curves in the SI units of `x` and `y`, each a name with its unit, "1" for a pure number.
+    """Axes with curves. `x` and `y` are the name and the unit of each axis, "1" for a pure number.
 
-    awaits : sentence shown until there is a result: what will appear, and when.
-    logarithmic : axes with a logarithmic scale, such as "xy".
+    The methods that add curves omit a curve without a finite point; arrays of different shapes raise ValueError.
+
+    awaits : sentence shown until there is a result, which announces it.
+    logarithmic : the axes that have a logarithmic scale.
     equal : whether both axes have the same scale, as for a complex plane.
     """
 
@@ -91,7 +98,7 @@ class Panel:
         return self._add("", x, y, "reference")
 
     def fit(self, fit: FitFinished) -> "Panel":
-        """Add the series of a fit that have the unit of `y`, by their names, against its axis; returns the panel."""
+        """Add the series of a fit that have the unit of `y`, at most `MOST`, over its first series; returns the panel."""
         (_, along), *others = fit.columns.items()
         chosen = [
             (name, series.values)
@@ -104,20 +111,20 @@ class Panel:
 
     def _add(self, name: str, x: ArrayLike, y: ArrayLike, style: Style, spread: ArrayLike | None = None) -> "Panel":
         place, value = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
-        doubt = None if spread is None else np.asarray(spread, dtype=np.float64)
-        shapes = {each.shape for each in (place, value, doubt) if each is not None}
+        expanded = None if spread is None else np.asarray(spread, dtype=np.float64)
+        shapes = {each.shape for each in (place, value, expanded) if each is not None}
         if len(shapes) != 1 or place.ndim != 1:
             raise ValueError(
                 f"the arrays of the curve {name!r} have shapes {shapes}; all must have the same shape (n,)"
             )
         if (np.isfinite(place) & np.isfinite(value)).any():
-            self.curves.append(Curve(name, place, value, style, doubt))
+            self.curves.append(Curve(name, place, value, style, expanded))
         return self
 
 
 @dataclass(frozen=True)
 class GainCurve:
-    """The gain alpha_2 of the points on its predicted lines, over the frequency or, under records, the stiffness."""
+    """Measured gains alpha_2 and their predicted lines, over the frequency or, for records, the stiffness ratio."""
 
 
 Verdict: TypeAlias = Literal["passed", "failed", "pending", "other"]
@@ -125,7 +132,7 @@ Verdict: TypeAlias = Literal["passed", "failed", "pending", "other"]
 
 @dataclass(frozen=True)
 class Check:
-    """A line of a checklist: what is checked, its verdict, and the measured value or the remedy as text."""
+    """A line of a checklist: the checked item, its verdict, and the measured value or the remedy as text."""
 
     what: str
     verdict: Verdict
@@ -134,7 +141,7 @@ class Check:
 
 @dataclass(frozen=True)
 class Checklist:
-    """Checks in the order of the run, with those that are still pending."""
+    """Checks in the order of the run, including those that are still pending."""
 
     checks: tuple[Check, ...]
 
@@ -144,7 +151,9 @@ LiveView: TypeAlias = Sequence[Panel | GainCurve | Checklist]
 
 @dataclass(eq=False)
 class LiveRun:
-    """What a run has published so far. `point` is the class of its points; `prediction` is empty until it is known."""
+    """The stored events of a run up to now, with its parameters and configuration. `point` is the class of its points;
+    `prediction` is empty until it is known.
+    """
 
     point: type[Parameters]
     parameters: Any
@@ -153,7 +162,7 @@ class LiveRun:
     _kept: dict[type[Event], deque[Event]] = field(default_factory=dict[type[Event], deque[Event]], init=False)
 
     def follow(self, event: Event) -> bool:
-        """Keep an event; returns whether the view may have changed."""
+        """Store an event; returns whether the view may have changed."""
         if isinstance(event, _ELSEWHERE):
             return False
         kind = type(event)
@@ -164,7 +173,7 @@ class LiveRun:
         return True
 
     def events(self, kind: type[E]) -> list[E]:
-        """The events of this type, in order."""
+        """The stored events of this type, in order."""
         return [event for event in self._kept.get(kind, ()) if isinstance(event, kind)]
 
     @property
@@ -174,11 +183,11 @@ class LiveRun:
 
     @property
     def fits(self) -> list[FitFinished]:
-        """The finished fits, in order."""
+        """The last `FITS` finished fits, in order."""
         return self.events(FitFinished)
 
     def column(self, field: str, points: Sequence[Parameters] | None = None) -> Array:
-        """A field of all or of the given `points`, shape (n,); NaN where it is absent."""
+        """A field of all points or of the given `points`, shape (n,); NaN where it is None."""
         values = [getattr(point, field) for point in (self.points if points is None else points)]
         return np.array([np.nan if value is None else value for value in values], dtype=np.float64)
 
@@ -214,7 +223,7 @@ def standard_view(run: LiveRun) -> LiveView:
 
 
 def response_panel(table: TableIdentified | None) -> Panel:
-    """The magnitude of the table's response over the frequency; None before it is identified."""
+    """Panel with the magnitude of the table's response over the frequency, empty while `table` is None."""
     panel = Panel(
         "response of the table",
         ("frequency", "Hz"),

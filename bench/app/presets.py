@@ -1,4 +1,4 @@
-"""Values of protocol forms, kept as protocol files: named presets, and the values of the last checked plan."""
+"""Values of protocol forms, stored as protocol files: named presets, and the values of the last checked plan."""
 
 import re
 from collections.abc import Mapping
@@ -16,7 +16,7 @@ _NAME = re.compile(r"[^\W_](?:[\w ().,=+-]*[\w)+])?")
 _NUMBER = re.compile(r"[+-]?(?:0|[1-9]\d*)(?:\.\d+)?(?:[eE][+-]?\d+)?")
 _LONGEST = 60
 LAST = "last-values"
-"""Folder of the values of the last checked plans; those of the presets are named after their protocols."""
+"""Folder of the values of the last checked plans; the folders of presets are named after their protocols."""
 
 Typed = Mapping[str, str | bool | list[str]]
 """Fields of a form as typed; empty ones are absent."""
@@ -33,7 +33,7 @@ class Presets:
         return sorted(path.stem for path in (self._folder / protocol).glob("*.toml"))
 
     def path(self, protocol: str, name: str) -> Path:
-        """File of a preset. Raises InvalidInput for a name that is no file name."""
+        """File of a preset. Raises InvalidInput for a name that is not a valid file name."""
         if not _NAME.fullmatch(name) or len(name) > _LONGEST:
             allowed = (
                 f"letters, digits, spaces and ().,=+- are allowed, up to {_LONGEST}, beginning with a letter or digit"
@@ -46,8 +46,8 @@ class Presets:
         return read_table(self.path(protocol, name), "preset")
 
     def save(self, protocol: Protocol[Any], name: str, typed: Typed) -> Path:
-        """Save a preset, replacing one with the same name; returns its file. Raises InvalidInput for a name that is no
-        file name, and RockbenchError if the disk fails.
+        """Save a preset, replacing one with the same name; returns its file. Raises InvalidInput for a name that is not
+        a valid file name, and RockbenchError if the file cannot be written.
         """
         path = self.path(protocol.name, name)
         _write(path, protocol, typed)
@@ -62,15 +62,15 @@ class Presets:
             raise InvalidInput("preset", str(path), f"it cannot be deleted ({error.strerror})") from None
 
     def last(self, protocol: str) -> dict[str, Any] | None:
-        """The unvalidated values of the last checked plan; None if there are none. Raises InvalidInput as `load`."""
+        """The unvalidated values of the last checked plan; None if there are none. Raises InvalidInput like `load`."""
         return read_table(self._last(protocol), "last values") if self.has_last(protocol) else None
 
     def has_last(self, protocol: str) -> bool:
-        """Whether a plan was checked before."""
+        """Whether the values of a checked plan are stored."""
         return self._last(protocol).exists()
 
     def keep_last(self, protocol: Protocol[Any], typed: Typed) -> None:
-        """Keep the values of a checked plan. Raises RockbenchError if the disk fails."""
+        """Store the values of a checked plan. Raises RockbenchError if the file cannot be written."""
         _write(self._last(protocol.name), protocol, typed)
 
     def _last(self, protocol: str) -> Path:
@@ -93,7 +93,7 @@ def _put(path: Path, text: str) -> None:
 
 
 def _toml(value: str | bool | list[str], *, many: bool) -> str:
-    """A typed value in TOML: a number as it was typed, all else as text, which a protocol file may have too."""
+    """A typed value in TOML: a number as typed, any other value as a string, which a protocol file may contain too."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, list):

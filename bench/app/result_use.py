@@ -28,8 +28,8 @@ class UsableResult:
     kind: Kind
 
     def applied(self, configuration: BenchConfiguration) -> BenchConfiguration:
-        """The configuration with this result in place of its own. Raises InvalidInput if the file or the result does
-        not suit the bench.
+        """The configuration with this result instead of its corresponding values. Raises InvalidInput if the file
+        cannot be read, or the result is not valid for the bench.
         """
         if self.kind == "specimen":
             changed = with_identified(configuration, read_specimen(self.path))

@@ -13,8 +13,8 @@ MEMBERS = ("status", "summary", "start_time", "metadata")
 
 @dataclass(frozen=True)
 class Heading:
-    """Status, reason for the end, time of creation (ISO 8601) and metadata of a campaign. The status of a file that is
-    being written, or whose writer was killed, is "running".
+    """Status, summary (the reason for the end), time of creation (ISO 8601) and metadata of a campaign. The status of a
+    file that is being written, or whose writer was killed, is "running".
     """
 
     status: str
@@ -24,10 +24,10 @@ class Heading:
 
 
 def read_heading(path: Path) -> Heading:
-    """The heading of a campaign file, in a few milliseconds. The file is not locked, and its writer is not disturbed.
+    """The heading of a campaign file, read in a few milliseconds without locking the file or disturbing its writer.
 
     Raises InvalidInput for a file of another kind, and DataFileError for a file whose heading cannot be read; damage to
-    other parts is not found.
+    other parts is not detected.
     """
     with open_file(path, judging=True, only=MEMBERS) as file:
         try:

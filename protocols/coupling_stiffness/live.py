@@ -1,4 +1,4 @@
-"""Live view of the identification of springs: their stiffness on the line of the labels, and the last decay."""
+"""Live view of the identification of springs: measured and labelled stiffness, and the last decay."""
 
 import numpy as np
 
@@ -7,12 +7,12 @@ from protocols.common.decays.live import decay_panel
 
 
 def springs_view(run: LiveRun) -> LiveView:
-    """Stiffness over the label, for every decay and for all decays of a spring; the last decay."""
+    """Stiffness over the beta on the label, from every decay and from all decays of a spring; the last decay."""
     panel = Panel(
         "stiffness of the springs",
         ("beta on the label", "1"),
         ("stiffness", "N/m"),
-        awaits="The stiffness of a spring appears here, decay by decay, on the line of the labels.",
+        awaits="The stiffness of each spring appears here after every decay; the line gives the labelled values.",
     )
     label, nominal = run.predicted("beta"), run.predicted("k_c")
     order = np.argsort(label)

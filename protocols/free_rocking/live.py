@@ -7,7 +7,7 @@ from bench.live_view import LiveRun, LiveView, Panel
 from sim.free_rocking import theoretical_restitution
 
 IMPACTS = "restitution"
-"""Series by which a fit of the impacts differs from a fit of the motion."""
+"""Series that a fit of the impacts has and a fit of the motion does not."""
 
 
 def rocking_view(run: LiveRun) -> LiveView:

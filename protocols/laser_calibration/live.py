@@ -8,7 +8,7 @@ LASERS = ("laser_1", "laser_2")
 
 
 def error_view(run: LiveRun) -> LiveView:
-    """Error of both lasers [um], and the change of each error without one of the passes."""
+    """Error of both lasers [um], and the change of each error when one of the passes is omitted."""
     errors = Panel(
         "error over the range",
         ("reading", "m"),
@@ -19,7 +19,7 @@ def error_view(run: LiveRun) -> LiveView:
         "residuals",
         ("reading", "m"),
         ("without a pass − all", "um"),
-        awaits="The change of the errors without one of the passes appears here.",
+        awaits="The changes of the errors when one of the passes is omitted appear here.",
     )
     found = {fit.name: fit.columns for fit in run.fits}
     for laser in LASERS:
