@@ -98,7 +98,7 @@ class Panel:
         return self._add("", x, y, "reference")
 
     def fit(self, fit: FitFinished) -> "Panel":
-        """Add the series of a fit that have the unit of `y`, at most `MOST`, over its first series; returns the panel."""
+        """Add the series of a fit that have the unit of `y`, up to `MOST`, over its first series; returns the panel."""
         (_, along), *others = fit.columns.items()
         chosen = [
             (name, series.values)

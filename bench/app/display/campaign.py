@@ -20,14 +20,16 @@ Place = tuple[int, int]
 
 @dataclass
 class Cell:
-    """A point: its result as text, and its status, which is declared by the protocol or in `texts`."""
+    """A point: its status, as reported by the protocol or one of `texts.POINT_*`, and its result as text."""
 
     status: str = texts.POINT_WAITS
     result: str = ""
 
 
 class Campaign:
-    """The points of a run in the order of its parameters; `rows` and `columns` are the values of the parameters."""
+    """The points of a run in the order of its parameters; `rows` and `columns` are the values of the two parameters
+    that span the matrix, or their names in the prediction.
+    """
 
     def __init__(self, protocol: Protocol[Any], run: Run) -> None:
         self._axes = protocol.view.matrix
@@ -38,8 +40,8 @@ class Campaign:
         self.name_points({})
 
     def name_points(self, prediction: Table) -> None:
-        """Use the names of the prediction on an axis of texts, in the same order: a record is called otherwise in the
-        results than in the parameter, which may refer to a file or be empty.
+        """Replace the values of an axis of strings by the names in the prediction, in the same order, and reset all
+        points: the results name a record, whereas the parameter may be a file path or empty.
         """
         for axis, values in zip(self._axes or (), (self.rows, self.columns), strict=False):
             column = prediction.get(axis.field)
@@ -72,7 +74,9 @@ class Campaign:
                 pass
 
     def expected(self, place: Place, remaining: float, now: datetime) -> datetime | None:
-        """Estimated end of a point, if the remaining points share the `remaining` time [s] equally; None if unknown."""
+        """Estimated end of a point, if the remaining points share the `remaining` time [s] equally; None for a finished
+        point or an unknown time.
+        """
         left = [*([] if self.current is None else [self.current]), *self.waiting]
         if place not in left or not isfinite(remaining):
             return None

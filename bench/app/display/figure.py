@@ -14,12 +14,12 @@ from bench.protocol import Protocol
 from sim.errors import RockbenchError
 
 LEAST = 1e-3
-"""Lower end of an uncertainty on a logarithmic axis, relative to the value, where the interval includes zero."""
+"""Smallest lower end of an uncertainty interval on a logarithmic axis, relative to the value."""
 
 
 def live_view(protocol: Protocol[Any], run: LiveRun) -> LiveView:
-    """The parts of the live view. An error in the protocol's function is shown in their place: it must not affect the
-    display of the bench.
+    """The parts of the live view. An error in the protocol's function is shown instead of them: it must not affect
+    the display of the bench.
     """
     try:
         with plugin_code(f"the live view of {protocol.name}"):
@@ -30,7 +30,9 @@ def live_view(protocol: Protocol[Any], run: LiveRun) -> LiveView:
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """A curve in displayed units, with arrays of shape (n,); `low` and `high` are the ends of its uncertainties."""
+    """A curve in displayed units, with arrays of shape (n,); `low` and `high` are the ends of its uncertainty
+    intervals, None if unknown.
+    """
 
     name: str
     x: NDArray[np.float64]

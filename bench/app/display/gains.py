@@ -32,8 +32,8 @@ class Line:
 
     group : stiffness or name of the record, represented by the colour.
     x, gain : abscissa, ascending, and gain, both of shape (n,).
-    band : lower and upper bounds of the gain, shape (2, n); None if unknown.
-    strong : False for the weaker branch.
+    band : lower and upper bounds of the gain, shape (2, n), NaN where the motion is unstable; None if unknown.
+    strong : False for the branch of the resting block.
     """
 
     group: float | str
@@ -162,7 +162,7 @@ class Difference:
 
     @property
     def score(self) -> float:
-        """|difference| over its uncertainty, the E_n score of ISO 13528: above 1 the runs differ. NaN without both."""
+        """|difference| over its uncertainty, the E_n score of ISO 13528: above 1, the runs differ. NaN if unknown."""
         return abs(self.value) / self.uncertainty if self.uncertainty > 0.0 else nan
 
 

@@ -52,7 +52,9 @@ class Meter:
 
     @property
     def time_to_limit(self) -> float:
-        """Time until the limit at the present growth [s]; infinite if the quantity does not grow."""
+        """Time until the limit at the present growth [s]; infinite if the quantity grows by less than `GROWTH`, is
+        below `NEAR` of its limit, or has been recorded for less than 1.5 `SPAN`.
+        """
         if not self._past:
             return inf
         newest = self._past[-1][0]

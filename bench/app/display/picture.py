@@ -17,7 +17,7 @@ from sim.block_face import displacement, rotation
 from sim.specimen import Specimen
 
 FACTOR = 5
-"""Initial magnification of the motion relative to the frame."""
+"""Initial magnification of the motion."""
 COILS, STEEPEST = 9, 1.4
 """Number of turns of the spring; largest drawn angle [rad]."""
 FLASH = 0.15
@@ -60,9 +60,9 @@ def pose_of(
     specimen: Specimen,
     factor: float = 1.0,
 ) -> Pose:
-    """Pose at one instant, with the motion magnified by `factor`: the signals `bench.app.ipc.messages.TRACES`, and the
-    modelled angle of the block [rad] and time since its last impact [s], None if unknown. While laser 2 measures the
-    block, the angle is that of the measured displacement, and storey 2 is drawn above storey 1.
+    """Pose at one instant, magnified by `factor`. `motion` has the signals `bench.app.ipc.messages.TRACES`, and `block`
+    the modelled angle of the block [rad] and the time since its last impact [s]; it is None if unknown. While laser 2
+    measures the block, the angle follows from the measured displacement, and storey 2 is drawn above storey 1.
     """
     motion = np.nan_to_num(motion)
     angle, struck = (0.0, inf) if arrangement.block_clamped else block or (None, inf)
@@ -97,7 +97,7 @@ def _measured(arrangement: Arrangement, pose: Pose) -> str:
 
 
 class Outline:
-    """Positions of frame and block at rest [m]."""
+    """Shapes of the picture, from the positions of frame and block at rest [m]."""
 
     def __init__(self, specimen: Specimen) -> None:
         self.specimen = specimen
@@ -161,8 +161,8 @@ class Outline:
                 yield Shape("impact", (foot,))
 
     def _turned(self, pose: Pose, x: float, y: float) -> Point:
-        """Position of the point (x, y) of the block at rest. A positive angle is a rotation about the left corner, with
-        the top towards the frame. An unknown angle is drawn as zero.
+        """Position of the point of the block that is at (x, y) at rest. A positive angle is a rotation about the left
+        corner, with the top towards the frame. An unknown angle is drawn as zero.
         """
         angle = max(min(pose.angle or 0.0, STEEPEST), -STEEPEST)
         corner = self.block - self.specimen.block.b if angle > 0.0 else self.block + self.specimen.block.b

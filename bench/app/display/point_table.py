@@ -17,7 +17,7 @@ _UNCERTAINTY, _PREDICTED = "_uncertainty", ("_predicted", "_nominal")
 MOST_NAMED = 2
 """Largest number of disagreeing results that are named in the verdict of a run."""
 _GOOD = ("", "steady", "held", "measured", "resting")
-"""States of a point that are not displayed next to its verdict."""
+"""Statuses of a point that are not displayed with its verdict."""
 
 
 @dataclass(frozen=True)
@@ -94,8 +94,8 @@ class Measured:
 def rows_of(
     results: Mapping[str, Column], points: Sequence[Mapping[str, Any]], labels: Mapping[str, str] = NO_LABELS
 ) -> list[Measured]:
-    """Quantities of all points: the fields with an uncertainty or, if no field has one, every number. `labels` are the
-    printed names of fields.
+    """Quantities of all points: the fields with an uncertainty or, if no field has one, the numbers after the first,
+    which identifies the point. A loop check has a row for each of its lines. `labels` are the printed names of fields.
     """
     stems = {name: without_unit(name, column.unit) for name, column in results.items()}
     if {"measured", "expected", "unit"} <= results.keys():
@@ -109,8 +109,8 @@ def rows_of(
 
 
 def summary_of(rows: Sequence[Measured]) -> str:
-    """Verdict of a run in one sentence: its only compared result, or how many agree and which do not. Empty without a
-    comparison.
+    """Verdict of a run in one sentence: its only compared result, or the number of results that agree and the first
+    ones that do not. Empty without a comparison.
     """
     judged = [row for row in rows if row.agrees is not None]
     if not judged:

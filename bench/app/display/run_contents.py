@@ -1,4 +1,4 @@
-"""Contents of a run display that follow from the events: verdict, current point, specimen, and last result."""
+"""Contents of a run display that are derived from the events: verdict, current point, specimen, and last result."""
 
 from math import inf
 from typing import Any
@@ -50,8 +50,8 @@ class RunContents:
     def instant(
         self, ring: Ring, block: BlockAngle, moment: float
     ) -> tuple[NDArray[np.float64], tuple[float, float] | None]:
-        """Signals and angle of the block at a bench time [s]; at rest, and unknown, before the first sample with the
-        present arrangement.
+        """Signals and angle of the block at a bench time [s], as from `Ring.at` and `BlockAngle.at`; zero and None
+        before the first sample with the present arrangement.
         """
         signals = ring.at(moment)
         return (signals, block.at(moment)) if moment > self.arranged else (np.zeros_like(signals), None)

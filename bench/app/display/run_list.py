@@ -1,4 +1,4 @@
-"""The runs of a folder: their data files, and a row of text for each. Independent of Qt."""
+"""The runs of a folder: their data files, and a row of texts for each. Independent of Qt."""
 
 import json
 import os
@@ -28,19 +28,21 @@ from bench.results import SUMMARY
 from sim.errors import InvalidInput, RockbenchError
 
 DEPTH = 2
-"""Levels of folders below that of the runs in which files are found."""
+"""Number of levels of subfolders that are searched for files."""
 MOST = 10_000
 """Largest number of listed files."""
 RECENT = 60.0
-"""Age of the last change up to which a file that was not closed counts as being written [s]: a writer on another
-computer is not registered here.
+"""Largest age of the last change with which a file that was not closed counts as being written [s]: a writer on
+another computer is not registered on this one.
 """
 UNUSABLE = (RockbenchError, *UNREADABLE)
 
 
 @dataclass(frozen=True)
 class Found:
-    """A data file. `stamp` changes with the file or its summary; `figures` are the pictures in its folder."""
+    """A data file. `stamp` changes with the file, and when a summary or a picture is added to its folder; `figures` are
+    the pictures in the folder.
+    """
 
     path: Path
     changed: float
@@ -64,13 +66,13 @@ class RunRow:
 
     @property
     def searched(self) -> str:
-        """Everything that a search compares, in small letters."""
+        """The searched text, in lower case."""
         return "\n".join((*self.cells, *self.tips)).lower()
 
 
 def find_runs(folder: Path) -> tuple[Found, ...]:
-    """The data files in `folder` and the folders below it, the last changed first. Raises OSError if the folder cannot
-    be read.
+    """The data files in `folder` and the folders below it, the last changed first; `MOST` at most. Raises OSError if
+    the folder cannot be read.
     """
     found = list[Found]()
     _find(folder, DEPTH, found)
@@ -108,7 +110,7 @@ def _find(folder: Path, depth: int, found: list[Found]) -> None:
 
 
 def read_row(found: Found) -> RunRow:
-    """The row of a data file. A file that is damaged or not one of a run has a row with the reason."""
+    """The row of a data file. The row of a file that is damaged, or is not that of a run, gives the reason."""
     try:
         heading = read_heading(found.path)
     except InvalidInput as error:
@@ -157,7 +159,7 @@ def _status(found: Found, heading: Heading) -> tuple[str, str]:
 
 
 def _result(found: Found, heading: Heading) -> tuple[str, str]:
-    """The main result in short, and in a sentence; empty without a result."""
+    """The main result as a short text and as a sentence; empty without a result."""
     try:
         protocol = load_protocol(heading.metadata.get("protocol", ""))
     except RockbenchError:
@@ -176,7 +178,7 @@ def _result(found: Found, heading: Heading) -> tuple[str, str]:
 
 
 def short_result(protocol: Protocol[Any], rows: Sequence[Measured]) -> tuple[str, str]:
-    """The headline of the results in short, with their agreement, and the verdict of `summary_of`."""
+    """The main result as a short text, with the agreement of the results, and the verdict of `summary_of`."""
     measured = [row for row in rows if isfinite(row.value)]
     if not measured:
         return "", ""
@@ -219,7 +221,7 @@ def _points(path: Path) -> list[dict[str, Any]]:
 
 
 def _figure(found: Found, metadata: Mapping[str, str]) -> Path | None:
-    """The main figure of the protocol if the run has it, else any picture in its folder."""
+    """The main figure of the protocol if the run has it, else the first picture in its folder; None without one."""
     try:
         names = load_protocol(metadata.get("protocol", "")).figures
     except RockbenchError:
@@ -245,7 +247,7 @@ def _specimen(metadata: Mapping[str, str]) -> str:
 
 
 def _local(iso: str) -> str:
-    """Date and time of day here."""
+    """Date and time in the local time zone; `iso` itself if it is not in ISO 8601."""
     try:
         return f"{datetime.fromisoformat(iso).astimezone():%Y-%m-%d %H:%M}"
     except ValueError:

@@ -21,7 +21,7 @@ LONGEST = 2_000_000
 SHORTEST = 64
 """Smallest number of samples of a spectrum."""
 LINES = 2000
-"""Largest number of drawn lines of a spectrum."""
+"""Largest number of drawn frequencies of a spectrum."""
 
 
 @dataclass(frozen=True)
@@ -36,8 +36,8 @@ class Track:
 
 @dataclass(frozen=True, eq=False)
 class Stretch:
-    """Samples of a track from `begin` to `end` [s] as a line through the minimum and the maximum of each of its
-    parts in turn. Both arrays have shape (n,); values are in the channel's unit.
+    """Samples of a track from `begin` to `end` [s] as a line through the minimum and the maximum of each part, or
+    through the samples themselves. Both arrays have shape (n,); values are in the channel's unit.
     """
 
     time: NDArray[np.float64]
@@ -59,16 +59,17 @@ class Spectrum:
 
 
 def read_stretches(tracks: Sequence[Track], begin: float, end: float, parts: int) -> list[Stretch]:
-    """Samples of the tracks between two times [s] since the rig was armed, each in at most `parts` parts.
+    """Samples of the tracks between two times [s] since the rig was armed, each in fewer than 2 x `parts` parts.
 
-    An interval with fewer than two samples per part is returned sample by sample. Raises RockbenchError.
+    An interval with fewer than two samples per part is returned sample by sample. Raises RockbenchError
+    for an unreadable file.
     """
     return [_stretch(record, track, begin, end, parts) for record, track in _opened(tracks)]
 
 
 def read_values(tracks: Sequence[Track], times: Sequence[float]) -> list[list[float]]:
     """The samples of each track nearest to the `times` [s], in the channel's unit; NaN outside the run. Raises
-    RockbenchError.
+    RockbenchError for an unreadable file.
     """
     found = list[list[float]]()
     for record, track in _opened(tracks):
@@ -88,8 +89,9 @@ def read_values(tracks: Sequence[Track], times: Sequence[float]) -> list[list[fl
 def read_spectra(tracks: Sequence[Track], begin: float, end: float) -> list[Spectrum]:
     """Amplitude spectra of all samples of the tracks between two times [s].
 
-    Missing samples are interpolated. A spectrum with more than `LINES` frequencies is reduced to the largest amplitude
-    of each group of them. Raises InvalidInput for too few or too many samples, and RockbenchError.
+    Missing samples are interpolated, and a track without samples is omitted. A spectrum with more than `LINES`
+    frequencies is reduced to the largest amplitude of each group of them. Raises InvalidInput for too few or too many
+    samples, and RockbenchError for an unreadable file.
     """
     found = list[Spectrum]()
     for record, track in _opened(tracks):

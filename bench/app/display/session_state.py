@@ -48,11 +48,11 @@ class SessionState:
         self.driven = False
         """Whether the rig has been armed in the run."""
         self.question: Question | None = None
-        """The question that waits for an answer."""
+        """The unanswered question, if any."""
         self.controls = attached is None
         """Whether this client may answer questions and ramp out. STOP is always effective."""
         self.lost = (0, 0)
-        """Numbers of events and of blocks of traces that were lost on the way."""
+        """Numbers of events and of blocks of traces that this client did not receive."""
         self.ended: Ended | Refused | None = None
         self._quiet, self._longest_quiet = 0.0, inf
         self._failure = ""

@@ -59,7 +59,7 @@ class Arrangement:
 
     `face` is the height above the table [m] at which laser 2 measures the block's face, None while it measures storey
     2. `tilt` is the rotation [rad] from which the block was released, and `pull` the displacement [m] from which storey
-    2 was released: there, the measured displacements are zero.
+    2 was released; in that position, the measured displacements are zero.
     """
 
     block: bool = False

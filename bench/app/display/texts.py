@@ -49,13 +49,13 @@ STOP_TIP = (
 LATCHED = "STOP was pressed: clear it first"
 STOPPED = "STOP was pressed"
 CLEAR = "Clear STOP"
-CLEAR_TIP = "Allows a new run. The stopped run is not resumed (Ctrl+Shift+K)."
+CLEAR_TIP = "Allows a new run (Ctrl+Shift+K). The stopped run is not resumed."
 CLEAR_BUSY = "The stopped run is still under way."
 
 ELAPSED, REMAINING, OWNER, STEP, INPUTS = "elapsed", "remaining", "run", "step", "safety inputs"
 NO_INPUTS = "none configured"
 INPUT_GOOD, INPUT_OPEN, INPUT_UNKNOWN = "good", "OPEN", "unknown"
-INPUTS_UNREAD = "read while a run is under way"
+INPUTS_UNREAD = "read only during a run"
 INPUTS_TIP = (
     "Second contacts of the emergency stop, the over-travel switches and the amplifier. They are read "
     "twice a second during a run, and shown as unknown after {stale:g} s without a reading."
@@ -154,7 +154,7 @@ ON_BLOCK = {
 """Labels of the laser 2 traces while it measures the block."""
 FRAME_AND_BLOCK = "Frame: measured. Block: model, driven by the measured table motion"
 FACTOR = "magnification"
-FACTOR_TIP = "Magnification of the motion relative to the frame: use the wheel, or + and −, on the picture."
+FACTOR_TIP = "Magnification of the motion; also with the mouse wheel, or the keys + and −, on the picture."
 
 OPEN, OPEN_TIP = "Open a file …", "Opens the campaign.h5 of a run (Ctrl+O)."
 OPEN_BESIDE = "{why}; a path can be typed at any time"
@@ -169,7 +169,7 @@ NO_FIGURE = "The run wrote no figure."
 POINT_TITLES = ("point", "quantity", "measured ± U", "predicted ± U", "difference", "verdict")
 POINT_TIPS = (
     "point of the campaign",
-    "measured quantity; the lower list has every field of the file",
+    "measured quantity; All fields shows every field of the file",
     "measured value and expanded uncertainty (k = 2)",
     "predicted or nominal value; its expanded uncertainty (k = 2), or the interval expected for the measured value",
     "measured minus predicted",
@@ -218,14 +218,14 @@ RUN_TITLES = ("", "protocol", "status", "result", "specimen", "operator", "date"
 RUN_TITLE_TIPS = (
     "Tick a run to draw it together with the other ticked ones and to compare it with the reference.",
     "protocol",
-    "how the run ended; running: its file is being written",
+    "status of the run; running: its file is being written",
     "main result, with expanded uncertainty (k = 2) and agreement with the prediction",
     "width and height of the block, stiffness of the first storey; identified: from a specimen file",
     "operator",
     "start of the run",
     "folder of the results",
 )
-RUN_FOREIGN, RUN_DAMAGED, RUN_FILE = "no run", "damaged", "the file"
+RUN_FOREIGN, RUN_DAMAGED, RUN_FILE = "not a run", "damaged", "the file"
 RUN_GOING, RUN_GOING_WHY = "running", "its file is being written"
 RUN_CUT = "not closed"
 RUN_CUT_WHY = "its writer was killed or is no longer writing; `rockbench file recover` writes a clean file"
@@ -255,10 +255,10 @@ USE_TIP = (
 )
 USE_BACK = "Configured values"
 USE_BACK_TIP = "Uses the values of the configuration again for all following runs (Ctrl+Shift+U)."
-USED = "Runs now use {files}. Configured values goes back."
-FURTHER, FURTHER_TIP = "and …", "Further channels, which are drawn over the first or, with another unit, below it."
-OVERLAY, OVERLAY_TIP = "ticked runs", "Draws the same channels of the same run of the other ticked files, too."
-CURSORS, CURSORS_TIP = "cursors", "Two cursors, A and B, to be dragged; the line below has the samples at both."
+USED = "Runs now use {files}. Configured values undoes this."
+FURTHER, FURTHER_TIP = "and …", "Adds channels, drawn in the plot of the first or, if they have another unit, below it."
+OVERLAY, OVERLAY_TIP = "ticked runs", "Also draws the same channels and run of the other ticked files."
+CURSORS, CURSORS_TIP = "cursors", "Shows two cursors, A and B, to drag; the line below gives the samples at both."
 SPECTRUM = "spectrum"
 SPECTRUM_TIP = (
     "Amplitude spectrum of all samples in the visible range (Hann window, mean removed): the line of a sine has the "
@@ -266,13 +266,13 @@ SPECTRUM_TIP = (
 )
 SPECTRUM_AXIS, AMPLITUDE = "frequency [Hz]", "amplitude"
 SPECTRUM_LONG = "a spectrum of the visible range takes too long: zoom in to at most {most:.0f} s"
-SPECTRUM_SHORT = "a spectrum takes at least {least} samples: zoom out"
+SPECTRUM_SHORT = "a spectrum needs at least {least} samples: zoom out"
 CURSOR_TIMES = "A {a:.4f} s, B {b:.4f} s, B − A {step:+.4f} s ({rate} Hz)"
 CURSOR_VALUES = "{name}: A {a}, B {b}, B − A {step} {unit}"
 SCORE, SCORES, SCORE_AXIS = "Eₙ", "normalised errors", "row of the table of points"
 SCORES_TIP = (
     "Eₙ = (measured − predicted) / combined expanded uncertainty (k = 2) of each compared result. Between the dashed "
-    "lines at ±1 they agree."
+    "lines at ±1, measurement and prediction agree."
 )
 
 WELCOME = (
@@ -285,7 +285,7 @@ TOUR = (
     "Watch the gain converge to its prediction on the Run page",
     "Read the verdict on the Results page, then open Figure",
 )
-TOUR_SHOW, TOUR_SHOW_TIP = "Show me", "Opens the page of the current step; its part is framed."
+TOUR_SHOW, TOUR_SHOW_TIP = "Show me", "Opens the page of the current step, on which its control is framed."
 TOUR_COMPLETE = "The tour is complete. Change a value on the Protocol page, and check the plan again for your own test."
 WELCOME_CLOSE = "Hide"
 CONFIGURATION = "Configuration"
@@ -338,13 +338,13 @@ CHECK_TITLES = ("verdict", "signal", "quantity", "measured", "U (k = 2)", "allow
 DEFAULTS, DEFAULTS_TIP = "Defaults", "Fills the form with the defaults of the protocol."
 LAST_VALUES = "Last values"
 LAST_VALUES_TIP = (
-    "Fills the form with the values of the last checked plan of this protocol, also of an earlier session."
+    "Fills the form with the values of the last checked plan of this protocol, which may be from an earlier session."
 )
 LAST_VALUES_NONE = "No plan of this protocol has been checked yet."
 LAST_VALUES_SHOWN = "Values of the last checked plan."
 PRESET, PRESET_HINT = "Presets", "preset: select or name"
 PRESET_TIP = "Select a preset to fill the form with it, or type a name to save the values of the form."
-PRESET_SAVE, PRESET_SAVE_TIP = "Save", "Saves the values of the form as the named preset, which it replaces."
+PRESET_SAVE, PRESET_SAVE_TIP = "Save", "Saves the values of the form as the named preset; an existing one is replaced."
 PRESET_DELETE, PRESET_DELETE_TIP = "Delete", "Deletes the file of the named preset; the form keeps its values."
 PRESET_LOADED, PRESET_SAVED, PRESET_DELETED = "Preset {name}.", "Saved: {path}", "Deleted: {name}"
 PRESET_NO_NAME, PRESET_NONE = "type a name first", "there is no preset with this name"
@@ -356,11 +356,13 @@ HELP_TYPED = "Command line: `--{option}`. Protocol file: `{key}`."
 HELP_PAGE = "Reference: {page}"
 HELP_OPEN, HELP_OPEN_TIP = (
     "Open the page",
-    "Opens the page of the documentation on this computer, in the desktop's program.",
+    "Opens the page of the documentation on this computer, in the default program of the desktop.",
 )
 HELP_CLOSE, HELP_CLOSE_TIP = "Close the help", "Shows the plan again."
 SOUNDS = "Sounds"
-SOUNDS_TIP = "Beeps: one for a question, two for the end of a run, five for an abort. Kept for the next start."
+SOUNDS_TIP = (
+    "Beeps: one for a question, two for the end of a run, five for an abort or a failure. Kept for the next start."
+)
 RECENT, RECENT_TIP = "Recent configurations", "Opens a configuration that was used before."
 
 ADD, ADD_TIP = "Add to queue", "Appends the checked plan to the queue (Ctrl+J)."
@@ -452,7 +454,7 @@ NO_VALUE = "–"
 TIME_TO_LIMIT = "limit in {seconds:.0f} s"
 METER_TIP = (
     "{name}: {text} (largest magnitude in the last block, and limit). Line: peak of the run, {peak}. Triangle: "
-    "planned, 95 % of the specimens stay below {planned}."
+    "planned value; 95 % of the specimens are predicted to stay below {planned}."
 )
 NAMES = {
     "meters": "meters of the limits",

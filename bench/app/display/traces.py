@@ -12,7 +12,7 @@ SHOWN = ("drive", "acceleration", "u1", "u2", "drift")
 WINDOW = 10.0
 """Displayed duration [s]."""
 STALE = 2.0
-"""Age of the newest sample above which traces and picture are marked as not live [s]."""
+"""Age of the newest sample from which traces and picture are marked as not live [s]."""
 
 Label = tuple[str, str, float]
 """Label, displayed unit, and displayed units per SI unit."""

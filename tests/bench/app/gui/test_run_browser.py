@@ -100,7 +100,7 @@ def test_a_row_has_the_result_the_specimen_and_the_origin_of_a_run(page: Results
 def test_files_that_are_no_runs_are_rows_with_the_reason(page: ResultsPage, folder: Path) -> None:
     browser = page.browser
     assert _cells(browser, "cut")[1] == "damaged"
-    assert _cells(browser, folder.name)[1:3] == ["no run", "this is not an HDF5 file"]
+    assert _cells(browser, folder.name)[1:3] == ["not a run", "this is not an HDF5 file"]
     row = _names(browser).index("cut")
     assert browser.model.index(row, 0).data(Qt.ItemDataRole.CheckStateRole) is None
     browser.table.setCurrentIndex(browser.model.index(row, 2))
