@@ -43,7 +43,7 @@ class MatrixView(QTableWidget):
         self.open({})
 
     def open(self, prediction: Table) -> None:
-        """Show the points by the names that they have in the prediction of the run."""
+        """Label the points with the names in the prediction of the run."""
         campaign, axes = self.campaign, self._axes
         if campaign is not None and axes is not None:
             campaign.name_points(prediction)
@@ -63,7 +63,7 @@ class MatrixView(QTableWidget):
             self.refresh(remaining)
 
     def refresh(self, remaining: float) -> None:
-        """Show every point, and the expected end of each one that is not complete."""
+        """Show every point, and the expected end of each one that is not finished; `remaining` as in `follow`."""
         campaign = self.campaign
         if campaign is None:
             return

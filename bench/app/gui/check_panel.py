@@ -1,4 +1,4 @@
-"""The loop check, which is started like any other run. Each line is shown with its verdict when it is complete."""
+"""Panel of the loop check, which is started like any other run; each line appears with its verdict when complete."""
 
 from datetime import datetime
 from pathlib import Path

@@ -19,8 +19,8 @@ from sim.parameters import Parameters
 
 
 class ConfigurationTree(QTreeWidget):
-    """Read-only view of a configuration. Values that differ from their defaults are bold, and their groups are
-    expanded.
+    """Read-only view of a configuration. Values that differ from their defaults are bold. Top-level groups are
+    expanded, and so are nested groups with such values.
     """
 
     def __init__(self) -> None:
@@ -68,7 +68,7 @@ class ConfigurationTree(QTreeWidget):
 
 
 def _line(of: Declared, value: object) -> QTreeWidgetItem:
-    """Add a key with all keys below it; the first column of its item stores whether any of their values differs from
+    """Item of a key, with those of the keys below it; its first column stores whether any of their values differs from
     the default.
     """
     changed = value != of.default

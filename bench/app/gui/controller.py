@@ -1,4 +1,4 @@
-"""The connection between session and widgets: turns messages into state and signals, and user input into requests.
+"""The connection between session and widgets: converts messages into state and signals, and user input into requests.
 
 It is independent of the protocols: the command line offers the same operations.
 """
@@ -31,9 +31,7 @@ from bench.app.ipc.sessions import RunningSession
 from drivers.clock import now
 
 PERIOD = 28
-"""Redraw interval [ms], for slightly more than thirty redraws per second; also the maximum interval between checks of
-the connection.
-"""
+"""Redraw interval [ms], for 35 redraws per second; also the longest interval between checks of the connection."""
 
 BUDGET = 0.02
 """Maximum time for handling messages in one iteration of the main loop [s]; the rest waits for the next iteration."""

@@ -34,7 +34,7 @@ class Form(QWidget):
         self._model = model
         values = with_present_names(model, values or {})
         self.unknown = {name: value for name, value in values.items() if name not in model.model_fields}
-        """Given values that the protocol has no parameter for."""
+        """Given values for which the protocol has no parameter."""
         self.fields: dict[str, Field] = {}
         self.errors: dict[str, QLabel] = {}
         layout = QFormLayout(self)
@@ -152,7 +152,7 @@ def _absent(value: object) -> bool:
 
 
 def _exactly(value: object) -> str:
-    """A value as typed, with as many digits as it has."""
+    """A value as typed, with all its digits."""
     text = as_typed(value)
     return repr(value) if isinstance(value, float) and float(text) != value else text
 
@@ -173,7 +173,9 @@ def _tip(entry: Declared) -> str:
 
 
 class RunOptions(QWidget):
-    """Form of the options of a run: folder of the results, operator, note, pace, and who answers the questions."""
+    """Form of the options of a run: folder of the results, operator, note, real time, questions to the operator, and
+    continuation without the window.
+    """
 
     def __init__(self, configuration: BenchConfiguration) -> None:
         super().__init__()
@@ -205,7 +207,7 @@ class RunOptions(QWidget):
         self.use(configuration)
 
     def use(self, configuration: BenchConfiguration) -> None:
-        """Reset to the defaults of this bench: on a real bench the operator answers."""
+        """Reset real time and questions to the defaults of this bench: on a real bench the operator answers."""
         self._configuration = configuration
         self.realtime.setChecked(True)
         self.realtime.setEnabled(not configuration.real_time_only)

@@ -117,7 +117,9 @@ class GainPlot(pg.PlotWidget):
         self._draw_spreads()
 
     def _spot(self, point: Mapping[str, Any], run: int) -> list[dict[str, Any]]:
-        """The symbol of a point; empty for a point without a gain. `_draw_spreads` draws the uncertainty."""
+        """The symbol of a point; empty for a point without gain fields, one that was not played, or one for other axes.
+        `_draw_spreads` draws the uncertainty.
+        """
         mark = mark_of(point)
         if mark is None:
             return []
@@ -148,8 +150,8 @@ class GainPlot(pg.PlotWidget):
         return [{"pos": (x, self._place(mark.gain)), "symbol": symbol, "size": 11, "pen": pen, "brush": brush}]
 
     def add_all(self, points: Sequence[Mapping[str, Any]], run: int = 0, name: str = "") -> None:
-        """Draw the points of a run, called `name` in the legend. Points whose abscissa is not that of the axis are not
-        drawn; the legend states this.
+        """Draw the points of a run, called `name` in the legend. Points for other axes are not drawn; if no
+        point of the run is drawn for this reason, the legend states it.
         """
         before = len(self._marks)
         self._draw([(point, run) for point in points])
@@ -214,7 +216,7 @@ class GainPlot(pg.PlotWidget):
             edges = [
                 pg.PlotCurveItem(line.x[part], np.log10(edge[part]) if self._log else edge[part]) for edge in line.band
             ]
-            # the axis ignores bands, since a wide band must not hide the points
+            # the range of the axis ignores bands, since a wide band would compress the points
             self._item.addItem(pg.FillBetweenItem(*edges, brush=pg.mkBrush(pale)), ignoreBounds=True)
         self.bands += 1
         self.setToolTip(texts.BAND)

@@ -160,7 +160,7 @@ class Header(QWidget):
 
     def fit(self, width: int, height: int) -> None:
         """Choose the layout for a window of this size [px]: a small window hides the details, and a narrow one
-        also times and lamp.
+        also hides the times and the lamp.
         """
         low = width < ROOMY[0] or height < ROOMY[1]
         self.details.setVisible(not low)
@@ -178,7 +178,7 @@ class Header(QWidget):
         self.word.setText(shown.word)
         set_level(self.word, shown.level)
         key_acts = application().applicationState() == Qt.ApplicationState.ApplicationActive
-        # a high header shows the step in a separate field
+        # a header with details shows the step in a separate field
         reason = "" if shown.reason == scene.step and self.details.isVisibleTo(self) else shown.reason
         said = ([texts.STOPPED + "."] if controller.latched else []) + [typeset(reason)]
         if controller.session.attached is not None and controller.running:

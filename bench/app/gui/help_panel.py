@@ -35,7 +35,7 @@ def reference_page(protocol: str, root: Path | None = None) -> tuple[str, QUrl |
 
 
 def reference_text(entry: Declared) -> list[str]:
-    """Paragraphs on a parameter: meaning, valid values, default, usual values, and its names as typed."""
+    """Paragraphs on a parameter: meaning, valid values, default, usual values, and its option and key."""
     unit = "" if entry.unit in ("", "1") else f" {unit_text(entry.unit)}"
     lines = [
         f"{typeset(entry.description[:1].upper() + entry.description[1:])}.",
@@ -51,7 +51,7 @@ def reference_text(entry: Declared) -> list[str]:
 
 
 class HelpPanel(QWidget):
-    """The help on one parameter at a time; it needs no network."""
+    """The help on one parameter at a time; no network is needed."""
 
     closed = Signal()
 

@@ -29,7 +29,9 @@ from bench.app.gui.sample_plot import Line, SamplePlot
 from bench.app.gui.widgets import ElidingLabel
 
 PARTS = 1200
-"""Number of parts of the visible range, with two points each."""
+"""Least number of parts of the visible range, with two points each; below twice this number of samples, each sample is
+drawn.
+"""
 SETTLE = 150
 """Delay between a zoom, or a move of a cursor, and the reading of the file [ms]."""
 MOST = 12

@@ -33,7 +33,7 @@ class LivePlot(QWidget):
         self._theme = theme
         self._panel: Panel | None = None
         self.figure = Figure("", "", "", (), "")
-        """What is drawn."""
+        """The drawn figure."""
         self.heading = QLabel(wordWrap=True, textFormat=Qt.TextFormat.RichText)
         self.plot = pg.PlotWidget(enableMenu=False)
         self.plot.setAccessibleName(texts.NAMES["live"])

@@ -20,11 +20,13 @@ from bench.protocol import Protocol
 from drivers.clock import now
 
 INTERVAL = 0.5
-"""Shortest time between two drawings of the panels [s]; two panels take about a tenth of it."""
+"""Shortest time between two drawings of the panels [s]; drawing two panels takes about a tenth of it."""
 
 
 class LiveViewArea(QWidget):
-    """Draws what the protocol's function returns, at `draw` and only after a change; a hidden page does not call it."""
+    """Draws the view that the protocol's function returns, in `draw` and only after a change; a hidden page does not
+    call `draw`.
+    """
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -61,7 +63,7 @@ class LiveViewArea(QWidget):
         self.gains.predict(prediction)
 
     def begin(self, protocol: Protocol[Any], run: Run) -> None:
-        """Replace the view of the last run by that of a run which begins."""
+        """Replace the view of the last run by that of a new run."""
         self._protocol, self._running = protocol, None
         self._run = LiveRun(protocol.point, run.parameters, run.configuration)
         self._show()

@@ -1,4 +1,4 @@
-"""The meters of the limited quantities, drawn."""
+"""Display of the meters of the limited quantities."""
 
 from collections.abc import Mapping, Sequence
 from math import inf, isfinite
@@ -15,7 +15,7 @@ from bench.config.model import BenchConfiguration
 from bench.preflight.margins import Margin
 
 LEAST_ROW, LARGEST_ROW = 30, 52
-"""Height of a meter [px]."""
+"""Smallest and largest height of a meter [px]."""
 
 
 class MetersView(QWidget):
@@ -49,7 +49,7 @@ class MetersView(QWidget):
             self.update()
 
     def show_live(self, *, live: bool) -> None:
-        """Draw in colour while values arrive, in grey otherwise."""
+        """Draw in colour if values arrive, otherwise in grey."""
         if live != self._live:
             self._live = live
             self.update()

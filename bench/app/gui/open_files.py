@@ -78,7 +78,7 @@ def _labels(protocol: str) -> Mapping[str, str]:
 
 
 class Place(Enum):
-    """Selection of an added file: ticked in addition to others (TOO), ticked ALONE, or only listed (ASIDE)."""
+    """Selection of an added file: ticked in addition to others (TOO), as the only one (ALONE), or only listed (ASIDE)."""
 
     TOO = auto()
     ALONE = auto()
@@ -110,7 +110,7 @@ class FileList(QListWidget):
         return [file for row, file in enumerate(self._files) if self.item(row).checkState() == checked]
 
     def put(self, file: RunFile, place: Place = Place.TOO) -> None:
-        """Add `file`; replaces an earlier reading of the same file."""
+        """Add `file`, or replace an earlier reading of the same file."""
         place_of = self._place(file.path)
         row = len(self._files) if place_of is None else place_of
         self.blockSignals(True)
@@ -143,14 +143,14 @@ class FileList(QListWidget):
         return self._place(path) is not None
 
     def tick(self, path: Path, *, on: bool) -> None:
-        """Tick or untick an open file; the first one is also selected."""
+        """Tick or untick an open file; it is also selected if no file is."""
         if (row := self._place(path)) is not None:
             self.item(row).setCheckState(Qt.CheckState.Checked if on else Qt.CheckState.Unchecked)
             if self.currentRow() < 0:
                 self.setCurrentRow(row)
 
     def make_first(self, path: Path) -> None:
-        """Move an open file to the top: the first ticked one is the reference."""
+        """Move an open file to the top of the list, where the first ticked file is the reference."""
         if (row := self._place(path)) is not None:
             self.blockSignals(True)
             chosen = self.currentItem()
@@ -176,5 +176,5 @@ class FileList(QListWidget):
 
     @staticmethod
     def path_of(text: str) -> Path:
-        """The path in pasted text."""
+        """The path in pasted text, without quotation marks."""
         return Path(text.strip().strip("'\"")).expanduser()

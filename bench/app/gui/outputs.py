@@ -1,4 +1,4 @@
-"""Report on a file, and export of a file, both by the commands of the command line; existing files are never
+"""Reports on a data file and exports of it, made by the commands of the command line; existing files are never
 overwritten.
 """
 
@@ -29,7 +29,7 @@ def free(path: Path) -> Path:
 
 
 class Outputs(QWidget):
-    """A row for an output: title, buttons and result."""
+    """Row that makes a report or an export of a file: choice of format and button for each, and the result."""
 
     def __init__(self) -> None:
         super().__init__()

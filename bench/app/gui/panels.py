@@ -15,7 +15,7 @@ from bench.events import Event, OperatorAsked
 from drivers.rig import OperatorTask
 
 UNREAD = 700
-"""Time after the appearance of a question during which answers are ignored [ms]: nobody can have read it yet."""
+"""Time after the appearance of a question during which no answer is accepted [ms]: nobody can have read it yet."""
 
 
 _AT_ZERO = "The output is at zero and the rig is stopped until you answer."
@@ -140,8 +140,8 @@ class Prompt(QFrame):
 
 
 SHARE, LEAST = 0.6, 70
-"""Largest fraction of the window below the header that panels take, and their minimum height [px] while one is
-shown.
+"""Largest fraction of the window below the header that panels may occupy, and the lower bound of this limit
+[px].
 """
 
 

@@ -119,8 +119,8 @@ class PhysicalPicture(QWidget):
         self.canvas.update()
 
     def move_to(self, motion: NDArray[np.float64], block: tuple[float, float] | None) -> None:
-        """Show one instant: the signals `bench.app.ipc.messages.TRACES`, and the block's angle [rad] and time since its
-        last impact [s], None if unknown.
+        """Show one instant: `motion` has the signals `bench.app.ipc.messages.TRACES`, and `block` the angle of the
+        block [rad] and the time since its last impact [s]; it is None if unknown.
         """
         self._motion, self._block = motion, block
         self._draw()

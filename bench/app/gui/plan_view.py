@@ -48,7 +48,7 @@ class PlanView(QWidget):
         layout.setStretch(2, 1)
 
     def warn(self, text: str) -> None:
-        """Show a warning that does not depend on the plan; empty for none."""
+        """Show a warning that does not depend on the plan; an empty `text` hides it."""
         self.warning.setText(f"▲ {text}")
         self.warning.setVisible(bool(text))
 

@@ -1,4 +1,4 @@
-"""The row of a protocol's form for its defaults, its last checked values, and its named presets."""
+"""Row above a protocol's form: defaults, last checked values, and named presets."""
 
 from collections.abc import Callable, Mapping
 from contextlib import suppress
@@ -20,11 +20,11 @@ from sim.errors import RockbenchError
 class PresetBar(QWidget):
     """Fills the form of a protocol, and saves its values. Without a `folder` only the defaults are available.
 
-    `last_values` and `defaults` are placed by the page, beside the choice of the protocol.
+    The page places `last_values` and `defaults` next to the choice of the protocol.
     """
 
     filled = Signal(object)
-    """Emits unvalidated values for the form, by parameter; those that are absent are the defaults."""
+    """Emits unvalidated values for the form, by parameter; for an absent one, the default applies."""
 
     def __init__(self, folder: Path | None) -> None:
         super().__init__()
@@ -79,11 +79,11 @@ class PresetBar(QWidget):
         try:
             return None if self._presets is None else self._presets.last(protocol.name)
         except RockbenchError:
-            # the button shows the reason
+            # the reason is shown when the button is pressed
             return None
 
     def keep_last(self) -> None:
-        """Keep the values of the form, whose plan was checked."""
+        """Store the values of the form, whose plan was checked."""
         presets, protocol, form = self._presets, self._protocol, self._form
         if presets is None or protocol is None or form is None:
             return
@@ -94,7 +94,7 @@ class PresetBar(QWidget):
         self._refresh()
 
     def report(self, done: str) -> None:
-        """State what the form was filled with, and what of it the protocol does not have or refuses."""
+        """Show `done`, the origin of the values in the form, and those that the protocol does not have or rejects."""
         form, words = self._form, [done]
         if form is not None and form.unknown:
             shown = ", ".join(f"{name} = {as_typed(value)}" for name, value in form.unknown.items())
@@ -162,7 +162,7 @@ class PresetBar(QWidget):
         self.name.setCurrentIndex(self.name.findText(name))
         self.name.setEditText(name)
         if (edit := self.name.lineEdit()) is not None:
-            # a long name begins at its first letter
+            # the beginning of a long name is visible
             edit.setCursorPosition(0)
         self.name.blockSignals(False)
         self._refresh()

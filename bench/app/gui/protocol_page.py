@@ -142,7 +142,7 @@ class ProtocolPage(QWidget):
         self.refresh()
 
     def begin(self) -> None:
-        """Start the run that was checked."""
+        """Start the checked run."""
         checked = self._checked
         if self.why_not or checked is None:
             return
@@ -216,7 +216,7 @@ class ProtocolPage(QWidget):
         self.right.setCurrentWidget(self.plan)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        """Let the help that is shown follow the focus."""
+        """If the help is shown, show that of the parameter with the focus."""
         if event.type() == QEvent.Type.FocusIn and self.right.currentWidget() is self.help:
             entry = self.form.entry_of(watched)
             if entry is not None:
@@ -241,7 +241,7 @@ class ProtocolPage(QWidget):
             self.presets.report(texts.LAST_VALUES_SHOWN)
 
     def _fill(self, values: Mapping[str, Any]) -> None:
-        """Fill the form of the selected protocol with unvalidated values; a queued test that is edited stays that."""
+        """Fill the form of the selected protocol with unvalidated values; the editing of a queued test continues."""
         self._show_form(Form(self.entry.parameters, values))
 
     def _show_form(self, form: Form) -> None:

@@ -1,4 +1,4 @@
-"""Checks the plans of a queue in the window: no test begins before all are accepted, individually and together."""
+"""Check of the plans of a queue in the window: no test begins before all are accepted, individually and together."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -1,5 +1,5 @@
-"""Runs a queue in the window: all plans are checked first, then tests run in separate sessions. STOP, or a
-test that does not end well, pauses the queue.
+"""Runs a queue in the window: all plans are checked first, then the tests run in separate sessions. STOP, or a test
+that is stopped, fails or does not pass, pauses the queue.
 """
 
 from collections.abc import Callable

@@ -26,7 +26,7 @@ class RecentFiles(QComboBox):
         super().__init__()
         self._settings = settings
         kept = None if settings is None else settings.value(_KEY)
-        # a list of one text is stored as the text
+        # QSettings returns a list of one string as the string
         texts_kept = [kept] if isinstance(kept, str) else cast(list[object], kept) if isinstance(kept, list) else []
         self.paths = [Path(text) for text in texts_kept if isinstance(text, str)]
         self.setPlaceholderText(texts.RECENT)
@@ -38,7 +38,7 @@ class RecentFiles(QComboBox):
         self._list()
 
     def add(self, path: Path) -> None:
-        """Put a file first."""
+        """Move a file to the top of the list, or add it there."""
         used = path.absolute()
         self.paths = [used, *(each for each in self.paths if each != used)][:MOST]
         if self._settings is not None:

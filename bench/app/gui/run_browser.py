@@ -31,7 +31,9 @@ RUNS = Path("runs")
 BATCH = 0.1
 """Time for which the thread reads files before their rows are shown [s]."""
 AGAIN, SETTLE = 5_000, 300
-"""Interval between two listings of a visible folder, whose files may grow, and delay after a change of it [ms]."""
+"""Interval between two listings of the shown folder, whose files may grow, and delay of a listing after a change of the
+folder [ms].
+"""
 WIDTHS = (92, 116, 88, 0, 120, 84, 150, 84)
 """Initial widths of the columns [px]; the result has the rest."""
 RESULT = texts.RUN_TITLES.index("result")
@@ -125,7 +127,7 @@ class RunBrowser(QWidget):
         self._reader.call(partial(find_runs, self.folder))
 
     def compare(self, compared: Sequence[Path]) -> None:
-        """Show which runs are compared, the reference first."""
+        """Mark the compared runs, of which the reference is the first."""
         self._compared = [each.resolve() for each in compared]
         self._mark()
         self._say()
@@ -136,14 +138,14 @@ class RunBrowser(QWidget):
         self._say()
 
     def showEvent(self, event: QShowEvent) -> None:
-        """List the folder, and follow it from now on."""
+        """List the folder, and start the periodic listing."""
         super().showEvent(event)
         self.model.ratio = self.devicePixelRatioF()
         self.look()
         self._again.start()
 
     def hideEvent(self, event: QHideEvent) -> None:
-        """Stop following the folder."""
+        """Stop the periodic listing."""
         super().hideEvent(event)
         self._again.stop()
 
@@ -163,7 +165,7 @@ class RunBrowser(QWidget):
         self._say()
 
     def _mark(self) -> None:
-        """Mark the compared runs under the names that the list has for them."""
+        """Mark the compared runs by their paths in the list."""
         real = self.folder.resolve()
         inside = [(each, each.is_relative_to(real)) for each in self._compared]
         self.model.compare([self.folder / path.relative_to(real) if own else path for path, own in inside])

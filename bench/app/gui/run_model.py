@@ -50,10 +50,10 @@ def _fitted(path: Path, size: QSize) -> QImage:
 
 
 class RunModel(QAbstractTableModel):
-    """The files that the search selects, in the selected order. A file without a row is still to be read."""
+    """The files that the search selects, in the selected order. A file without a row has not been read yet."""
 
     ticked = Signal(object, bool)
-    """Emits the path of a run that was ticked or unticked, and which of both."""
+    """Emits the path of a run, and whether it was ticked or unticked."""
 
     def __init__(self, theme: Theme, parent: QObject) -> None:
         super().__init__(parent)
@@ -203,7 +203,7 @@ class RunModel(QAbstractTableModel):
         return self._pixmaps.get(key)
 
     def _load(self) -> None:
-        # the pictures that were asked for last are the visible ones
+        # the pictures that were requested last are the visible ones
         self._wanted = self._wanted[-4 * AT_ONCE :]
         if self._wanted and not self._loading:
             self._loading = True

@@ -17,11 +17,11 @@ from bench.app.gui.widgets import colour_axes
 
 DASHES = (Qt.PenStyle.SolidLine, Qt.PenStyle.DashLine, Qt.PenStyle.DotLine)
 PLACES = (1.0 / 3.0, 2.0 / 3.0)
-"""First places of the cursors, relative to the visible range."""
+"""Initial positions of the cursors, relative to the visible range."""
 WIDTH = 62
 """Width of the vertical axes [px], which aligns the plots."""
 ABREAST = 2
-"""Largest number of lines whose names are below each other in the legend."""
+"""Largest number of lines for which the legend has a single column."""
 GROUND = 150
 """Opacity of the background of the legend, from 0 to 255."""
 
@@ -37,7 +37,7 @@ class Line:
 
 
 class SamplePlot(pg.GraphicsLayoutWidget):
-    """Lines that share the horizontal axis, below each other by unit; the wheel zooms, dragging pans."""
+    """Lines over a common horizontal axis, in stacked plots, one for each unit; the wheel zooms, dragging pans."""
 
     range_changed = Signal()
     cursors_moved = Signal()
@@ -64,7 +64,7 @@ class SamplePlot(pg.GraphicsLayoutWidget):
 
     @property
     def cursors(self) -> tuple[float, float] | None:
-        """Places of the two cursors; None while they are hidden."""
+        """Positions of the two cursors; None while they are hidden."""
         return self._cursors
 
     def use_theme(self, theme: Theme) -> None:
@@ -86,7 +86,7 @@ class SamplePlot(pg.GraphicsLayoutWidget):
         for plot, unit in zip(self.plots, units, strict=True):
             plot.clearPlots()
             own = [line for line in lines if line.unit == unit]
-            # a low plot has no space for a name; the legend has it
+            # stacked plots have no space for a name, which is in the legend
             name = lines[0].name if len(lines) == 1 else self._left if len(units) == 1 else ""
             plot.setLabel("left", " ".join(part for part in (name, f"[{unit}]" if unit else "") if part))
             plot.legend.clear()
@@ -152,7 +152,7 @@ class SamplePlot(pg.GraphicsLayoutWidget):
         return pair[0], pair[1]
 
     def _follow(self, moved: Any) -> None:
-        """Let the cursors of all plots follow the one that is dragged."""
+        """Move the cursors of all plots with the one that is dragged."""
         if self._moving or self._cursors is None:
             return
         pair = next(pair for pair in self._pairs if moved in pair)

@@ -99,7 +99,7 @@ class SetupPage(QWidget):
     used = Signal(object)
     """Emits the paths of the result files that the following runs use instead of the configured ones, by kind."""
     refused = Signal(str)
-    """Emits why a result file is not used."""
+    """Emits the reason why a result file is not used."""
 
     def __init__(
         self,
@@ -164,7 +164,7 @@ class SetupPage(QWidget):
         self._use(configuration, self.path)
 
     def use_given(self) -> None:
-        """Use no results of runs other than those of the configuration."""
+        """Use the configuration as opened, without results selected since."""
         self._used = {}
         self._use(self._given, self.path)
 

@@ -11,14 +11,14 @@ QUESTION, END, ABORT = 1, 2, 5
 """Numbers of beeps."""
 
 INTERVAL = 220
-"""Time between two beeps [ms], which the bells of desktops still separate."""
+"""Time between two beeps [ms], long enough for the bell of a desktop to sound separately."""
 
 GOOD = ("completed", "stopped")
-"""Statuses of runs that did not end for a fault."""
+"""Statuses of runs that did not end because of a fault."""
 
 
 class Sounds(QObject):
-    """Beeps with the bell of the desktop, which has no sound without a device. `muted` silences it."""
+    """Beeps with the bell of the desktop, which is silent without a sound device. `muted` disables it."""
 
     def __init__(self, controller: Controller, parent: QObject | None = None) -> None:
         super().__init__(parent)
@@ -33,7 +33,7 @@ class Sounds(QObject):
         controller.ended.connect(self._ended)
 
     def sound(self, beeps: int) -> None:
-        """Beep; a sequence that is not over is replaced by a longer one only."""
+        """Begin a sequence of beeps; a sequence in progress is only replaced by one that is longer than its rest."""
         if self.muted or beeps <= self._left:
             return
         self._left = beeps

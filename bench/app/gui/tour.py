@@ -16,15 +16,15 @@ DONE, NEXT, LATER = "✓", "▶", "○"
 
 @dataclass(frozen=True)
 class Place:
-    """Where a step is done: `show` opens the page, and `control` is the part that is framed, if there is one to use."""
+    """Location of a step: `show` opens its page, and `control` is the control to be framed, if the step has one."""
 
     show: Callable[[], None]
     control: QWidget | None = None
 
 
 class Tour(QFrame):
-    """The guided tour. It performs no step, and stays at each one until it is done: the part for it is framed, and
-    *Show me* opens its page.
+    """The guided tour. It performs no step itself, and stays at each one until the user has done it; the control of the
+    step is framed, and *Show me* opens its page.
     """
 
     def __init__(self, controller: Controller) -> None:
@@ -57,7 +57,7 @@ class Tour(QFrame):
         self._show()
 
     def guide(self, places: Sequence[Place]) -> None:
-        """Frame the parts of these places, one for each step."""
+        """Set the locations of the steps, in order, and frame their controls."""
         self._places = tuple(places)
         self._show()
 
@@ -73,7 +73,9 @@ class Tour(QFrame):
         self._frame()
 
     def give_way(self, reason: str, *, to: bool) -> None:
-        """Hide for a `reason`: more important content needs the space, or the bench is not simulated."""
+        """Hide while `to` is True for any `reason`: more important content needs the space, or the bench is not
+        simulated.
+        """
         (self._reasons.add if to else self._reasons.discard)(reason)
         self.setVisible(self._wanted and not self._reasons)
         self._frame()
@@ -111,7 +113,7 @@ class Tour(QFrame):
         self._frame()
 
     def _frame(self) -> None:
-        """Frame the part of the current step while the tour is shown."""
+        """Frame the control of the current step while the tour is shown."""
         shown = self._wanted and not self._reasons
         for place, each in enumerate(self._places):
             if each.control is not None:

@@ -21,7 +21,7 @@ from bench.app.ipc.messages import Traces
 from drivers.clock import now
 
 BUCKETS = 700
-"""Number of parts into which the displayed duration is divided, each drawn as two points."""
+"""Number of parts of the displayed duration, each drawn as two points."""
 AHEAD = 0.5
 """Longest time [s] for which the axis scrolls without a new sample."""
 HEADROOM, WIDE, LEAST = 1.15, 2.0, 1e-3
@@ -118,8 +118,8 @@ class TracePlot(QWidget):
 
     @property
     def moment(self) -> float:
-        """Bench time [s] of the instant that the picture shows, one block before the newest sample, so that the picture
-        advances evenly.
+        """Bench time [s] that the picture shows: one block behind real time, but never later than the newest sample, so
+        that the picture advances evenly.
         """
         return self.ring.newest - max(self._length - self.age, 0.0)
 

@@ -1,4 +1,4 @@
-"""Row in which a result of the selected run is taken over for the next run."""
+"""Row for the use of a result of the selected run in the following runs."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -13,8 +13,8 @@ from bench.app.result_use import results_in
 
 
 class UseResult(QWidget):
-    """Choice of a result, and buttons to use it and to return to the configured values. Hidden while neither
-    applies.
+    """Choice of a result, and buttons to use it and to return to the configured values; hidden while there is no result
+    to use and none in use.
     """
 
     wanted = Signal(object)
@@ -49,14 +49,14 @@ class UseResult(QWidget):
         self._refresh()
 
     def show_used(self, used: Mapping[str, Path]) -> None:
-        """Show the files that the next run uses, by kind."""
+        """Show the result files that the following runs use, by kind."""
         self._used = used
         files = ", ".join(f"{kind} {path.absolute().parent.name}/{path.name}" for kind, path in used.items())
         self._say(texts.USED.format(files=files) if files else "", "good")
         self._refresh()
 
     def show_refusal(self, text: str) -> None:
-        """Show why a result is not used."""
+        """Show the reason why a result is not used."""
         self._say(f"▲ {text}", "alarm")
         self._refresh()
 

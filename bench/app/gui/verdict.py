@@ -13,7 +13,7 @@ LARGEST, SMALLEST = 48, 14
 STRETCH = 80
 """Width of the letters relative to their normal width [%]."""
 UNBROKEN = 24
-"""Greatest length of a part of the sentence that is kept on one line."""
+"""Greatest length of a part of the sentence that is kept on one line [characters]."""
 SPACE = 0.31
 """Largest share of the page's height that the sentence may occupy."""
 FLAGS = int(Qt.TextFlag.TextWordWrap | Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignLeft)

@@ -169,7 +169,7 @@ class _Holder(QWidget):
 
 
 def give_key(button: QAbstractButton, key: str) -> None:
-    """Let `key` press the button while the button is visible and enabled. A held key counts once, whereas the button's
+    """Make `key` press the button while the button is visible and enabled. A held key counts once, whereas the button's
     own shortcut would repeat.
     """
     shortcut = QShortcut(QKeySequence(key), button, autoRepeat=False)

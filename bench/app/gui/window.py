@@ -1,4 +1,4 @@
-"""The operator's window: the header with STOP, the panels below it, and the pages; and Qt's main loop."""
+"""The operator's window, with the header with STOP, the panels below it and the pages; and Qt's main loop."""
 
 import signal
 import sys
@@ -220,7 +220,7 @@ class Window(QMainWindow):
         self.queue.edit_requested.connect(self._edit)
 
     def _guide(self) -> None:
-        """Let the tour frame the parts of its steps, and complete it with the figure of the run."""
+        """Set the locations of the tour's steps; opening the figure of the run completes the tour."""
         pages, results = self.pages, self.results
         self.welcome.guide(
             [
@@ -236,7 +236,7 @@ class Window(QMainWindow):
                 self.welcome.read_results()
 
         results.parts.currentChanged.connect(opened)
-        # the figure may be the one that is shown already
+        # the tab of the figure may be selected already
         results.parts.tabBarClicked.connect(opened)
 
     def _began(self, run: Run) -> None:
