@@ -78,7 +78,7 @@ def _labels(protocol: str) -> Mapping[str, str]:
 
 
 class Place(Enum):
-    """Selection of an added file: ticked in addition to others (TOO), as the only one (ALONE), or only listed (ASIDE)."""
+    """Selection of an added file: ticked in addition to others (TOO), ticked alone (ALONE), or only listed (ASIDE)."""
 
     TOO = auto()
     ALONE = auto()
