@@ -78,7 +78,7 @@ def _ended(folder: Path) -> tuple[str, str]:
     """How the run ended; its file is whole and the drive ends at zero."""
     until(lambda: _status(folder)[0] != "running", "the run did not end")
     path = next(folder.glob("runs/*/campaign.h5"))
-    until(lambda: verify(path).problems == (), 10.0, "the file is not whole")
+    until(lambda: verify(path).problems == (), "the file is not whole")
     with open_datafile(path) as record:
         assert record.drive()[-1] == 0.0
         assert record.end_time
