@@ -1,7 +1,8 @@
 """Loading of the compiled model; the first use after an installation compiles it once, which takes several seconds.
 
 Compilation runs in two processes where there are two processors: a helper compiles the modules of `APART`, which use no
-other ones or only early ones, into the same cache. Modules that it does not deliver are compiled here.
+other ones or only early ones, into the same cache. Modules that it does not deliver are compiled here. Steady motions
+need none of them.
 """
 
 import os
@@ -16,11 +17,14 @@ from typing import IO
 
 from sim.waiting import end, join, wait
 
-STEADY = {"roots": 6, "watching": 8, "steps": 3, "resting": 14, "members": 40}
+STEADY = {"steps": 3, "roots": 6, "watching": 8, "members": 27}
 """Modules of `sim.kernel` used by predictions of steady motions, with their shares of the compilation time."""
 
-MODEL = {**STEADY, "rocking": 20}
+MODEL = {**STEADY, "resting": 14, "rocking": 20}
 """Modules used by every prediction."""
+
+RECORDS = {**MODEL, "members_at_rest": 10}
+"""Modules used by predictions of many runs under a record."""
 
 BENCH = {**MODEL, "laser": 3, "filter": 2, "plant": 8, "table": 15}
 """Modules used by a simulated bench."""

@@ -8,10 +8,9 @@ its lane takes the next one.
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.kernel.compiled import compiled
+from sim.kernel.compiled import compiled, inlined
 from sim.kernel.lanes import LANES, get
 from sim.kernel.packing import COUPLED, H_B, B
-from sim.kernel.resting import LOOK_INSIDE, TABLE_ROWS, glide, propagator
 from sim.kernel.steps import (
     COMPLETED,
     END,
@@ -43,11 +42,30 @@ from sim.kernel.watching import (
     tail,
 )
 
+Array = NDArray[np.float64]
 
-@compiled(
-    "void(float64[:,::1], int64[::1], float64[:,::1], int64[:,::1], float64[:,::1], int64, float64, float64, float64,"
-    " float64[::1], int64, float64[:,::1])"
+TAIL, SIDE, LENGTH, TAU, BEGIN, LOST, MET = range(7)
+"""Rows of `values`: tail of the step's polynomial, corner, length of the step [s], time since the segment's start [s],
+start of the segment [s] and its rounding error, length of the last segment at rest (negative if tabulated).
+"""
+
+MEMBER, SEGMENT, KNOWN, STEPPED, ASKS, WAITING = range(6)
+"""Rows of `places`: member of the lane (-1: none), its segment, number of known roots theta = 0, the segment at
+whose start the block rests and which needs Taylor steps, and whether the lane needs the exact step at rest. The first
+value of WAITING is the first member without a lane.
+"""
+
+NO_VALUES, NO_PLACES = np.zeros((7, LANES)), np.zeros((6, LANES), np.int64)
+NO_VALUES[SIDE], NO_PLACES[MEMBER] = 1.0, -1
+"""Lanes without members."""
+
+MEMBERS = (
+    "float64[:,::1], int64[::1], float64[:,::1], int64[:,::1], float64[:,::1], int64, float64, float64, float64,"
+    " float64[::1], int64, float64[:,::1]"
 )
+"""Types of the arguments of `advance_members`."""
+
+
 def advance_members(
     specimens: NDArray[np.float64],
     specimen_of: NDArray[np.int64],
@@ -69,162 +87,160 @@ def advance_members(
     peaks_from : shape (m,) [s].  reports : shape (m, REPORT), written.
     The other arguments are those of `sim.kernel.rocking.run`.
     """
-    n, count = order, states.shape[0]
-    # arrays of all lanes
-    p, row, x = np.ones((16, LANES)), np.zeros((10, LANES)), np.zeros((6, LANES))
+    memory, places = NO_VALUES.copy(), NO_PLACES.copy()
+    arguments = specimens, specimen_of, segments, spans, states, order, tolerance, theta_limit, rest_angle, peaks_from
+    if advance_lanes(*arguments, impact_limit, reports, memory, places):
+        # compiled only when a block first rests under an acceleration that is not a sine
+        from sim.kernel.members_at_rest import advance_with_rest
+
+        advance_with_rest(*arguments, impact_limit, reports, memory, places)
+
+
+@inlined
+def end_segment(values: Array, places: NDArray[np.int64], lane: int, length: float) -> None:
+    """Set a lane to the start of its next segment."""
+    # compensated sum, because a record has tens of thousands of equal segments
+    begin, gained = values[BEGIN, lane], length - values[LOST, lane]
+    values[BEGIN, lane] = begin + gained
+    values[LOST, lane] = (values[BEGIN, lane] - begin) - gained
+    values[TAU, lane] = 0.0
+    places[SEGMENT, lane] += 1
+
+
+@inlined
+def is_linear(segment: Array) -> bool:
+    """Whether the acceleration of a segment is linear in time."""
+    return segment[1] == 0.0 and segment[2] == 0.0 and segment[3] == 0.0 and segment[4] == 0.0
+
+
+@compiled(f"boolean({MEMBERS}, float64[:,::1], int64[:,::1])")
+def advance_lanes(
+    specimens: Array,
+    specimen_of: NDArray[np.int64],
+    segments: Array,
+    spans: NDArray[np.int64],
+    states: Array,
+    n: int,
+    tolerance: float,
+    theta_limit: float,
+    rest_angle: float,
+    peaks_from: Array,
+    impact_limit: int,
+    reports: Array,
+    memory: Array,
+    numbers: NDArray[np.int64],
+) -> bool:
+    """Take steps of all lanes until every member has ended, and return False; or until the block of a member rests at
+    the start of a segment of linear acceleration, and return True.
+
+    The exact step for such a segment, in the lanes marked in the row ASKS, is that of `sim.kernel.members_at_rest`,
+    which then calls again. Between calls, `memory` and `numbers` keep the state of the lanes, `values` and `places`.
+    """
+    count = states.shape[0]
+    # allocated here, because the compiler then knows their shapes
+    values, places = np.zeros((7, LANES)), np.zeros((6, LANES), np.int64)
+    p, row = np.ones((16, LANES)), np.zeros((10, LANES))
     a, c, w = np.zeros((n + 1, LANES)), np.zeros((6, n + 1, LANES)), np.zeros((WORK_ROWS, n + 1, LANES))
     following, bounds = np.zeros((6, LANES)), np.zeros((3, LANES))
-    side, clock, length, rests = np.ones((1, LANES)), np.zeros((1, LANES)), np.zeros((1, LANES)), np.zeros((1, LANES))
-    # per lane: its member, its segment, number of known roots, time since the segment's start, start of the segment and
-    # its rounding error, length of the last segment at rest (negative if tabulated), table
-    member, segment, known = np.full(LANES, -1), np.zeros(LANES, np.int64), np.zeros(LANES, np.int64)
-    tau, begin, met, table = np.zeros(LANES), np.zeros((LANES, 2)), np.zeros(LANES), np.zeros((LANES, TABLE_ROWS, 6))
-    # arrays of one lane, for events and rest
     a1, c1, after, e = np.zeros(n + 1), np.zeros((6, n + 1)), np.zeros(6), np.zeros(n + 1)
-    no_samples = np.empty((0, 6))
-    waiting = 0
+    for lane in range(LANES):
+        for k in range(7):
+            values[k, lane] = memory[k, lane]
+        for k in range(6):
+            places[k, lane] = numbers[k, lane]
+        if places[MEMBER, lane] >= 0:
+            for k in range(16):
+                p[k, lane] = specimens[specimen_of[places[MEMBER, lane]], k]
     while True:
-        active, rocking, watching = 0, 0, 0
+        active, rocking, watching, asking = 0, 0, 0, False
         for lane in range(LANES):
             while True:
-                j = member[lane]
+                j = places[MEMBER, lane]
                 if j < 0:
-                    if waiting == count:
+                    if places[WAITING, 0] == count:
                         break
-                    j = member[lane] = waiting
-                    waiting += 1
+                    j = places[MEMBER, lane] = places[WAITING, 0]
+                    places[WAITING, 0] += 1
                     for k in range(16):
                         p[k, lane] = specimens[specimen_of[j], k]
                     for k in range(REPORT):
                         reports[j, k] = 0.0
-                    state = states[j]
-                    segment[lane] = spans[j, 0]
-                    tau[lane] = begin[lane, 0] = begin[lane, 1] = 0.0
-                    met[lane] = segments[spans[j, 0], 0]
-                    side[0, lane] = np.sign(state[4]) if state[4] != 0.0 else np.sign(state[5])
-                    known[lane] = 1 if state[4] == 0.0 else 0
-                i = segment[lane]
+                    places[SEGMENT, lane], places[STEPPED, lane] = spans[j, 0], -1
+                    values[TAU, lane] = values[BEGIN, lane] = values[LOST, lane] = 0.0
+                    values[MET, lane] = segments[spans[j, 0], 0]
+                    values[SIDE, lane] = np.sign(states[j, 4] if states[j, 4] != 0.0 else states[j, 5])
+                    places[KNOWN, lane] = 1 if states[j, 4] == 0.0 else 0
+                i, begin = places[SEGMENT, lane], values[BEGIN, lane]
                 if i == spans[j, 1]:
-                    reports[j, END] = begin[lane, 0]
-                    member[lane] = -1
+                    reports[j, END] = begin
+                    places[MEMBER, lane] = -1
                     continue
-                this = segments[i]
-                if not this[0] - tau[lane] > 1e-14 * this[0]:
-                    # compensated sum, because a record has tens of thousands of equal segments
-                    gained = this[0] - begin[lane, 1]
-                    end = begin[lane, 0] + gained
-                    begin[lane, 1] = (end - begin[lane, 0]) - gained
-                    begin[lane, 0] = end
-                    tau[lane] = 0.0
-                    segment[lane] += 1
+                if not segments[i, 0] - values[TAU, lane] > 1e-14 * segments[i, 0]:
+                    end_segment(values, places, lane, segments[i, 0])
                     continue
-                sine = this[1] != 0.0 or this[2] != 0.0 or this[3] != 0.0 or this[4] != 0.0
-                if side[0, lane] == 0.0 and tau[lane] == 0.0 and not sine:
-                    # a table is worth its cost from the second segment of equal length on; a negative length means that
-                    # the table has been computed
-                    if met[lane] == this[0]:
-                        met[lane] = -this[0]
-                        propagator(specimens[specimen_of[j]], this[0], n, tolerance, table[lane])
-                    elif met[lane] != -this[0]:
-                        met[lane] = this[0]
-                    if met[lane] == -this[0] and table[lane, 0, 0] > 0.0:
-                        last, peaks = segments[: spans[j, 1]], reports[j, PEAKS:]
-                        i, found = glide(
-                            specimens[specimen_of[j]],
-                            table[lane],
-                            last,
-                            i,
-                            states[j],
-                            np.inf,
-                            peaks_from[j],
-                            peaks,
-                            begin[lane],
-                            after,
-                            no_samples,
-                            0,
-                        )
-                        reports[j, STEPS] += i - segment[lane]
-                        segment[lane] = i
-                        if i == spans[j, 1]:
-                            continue
-                        this = segments[i]
-                        if found == LOOK_INSIDE:
-                            # the exact step is known, so that the polynomial is needed only for the peaks within it
-                            forcing_coefficients(this, 0.0, a1, n)
-                            for k in range(6):
-                                c1[k, 0] = states[j, k]
-                            resting_coefficients(specimens[specimen_of[j]], a1, c1, n)
-                            after[4] = after[5] = 0.0
-                            if begin[lane, 0] + this[0] > peaks_from[j]:
-                                start = max(0.0, peaks_from[j] - begin[lane, 0])
-                                raise_peaks(c1, n, start, this[0], after, False, e, peaks)
-                            for k in range(4):
-                                states[j, k] = after[k]
-                            reports[j, STEPS] += 1.0
-                            tau[lane], known[lane] = this[0], 0
-                            continue
-                        if found != 0:
-                            continue
+                rests = values[SIDE, lane] == 0.0 and values[TAU, lane] == 0.0 and places[STEPPED, lane] != i
+                if rests and is_linear(segments[i]):
+                    places[ASKS, lane] = 1
+                    asking = True
+                    break
+                active += 1
+                rocking += 1 if values[SIDE, lane] != 0.0 else 0
+                watching += 1 if peaks_from[j] < np.inf else 0
+                for k in range(6):
+                    c[k, 0, lane] = states[j, k]
+                for k in range(10):
+                    row[k, lane] = segments[i, k]
                 break
-            j = member[lane]
-            if j < 0:
-                continue
-            active += 1
-            rocking += 1 if side[0, lane] != 0.0 else 0
-            watching += 1 if peaks_from[j] < np.inf else 0
-            for k in range(6):
-                x[k, lane] = states[j, k]
-                c[k, 0, lane] = states[j, k]
-            for k in range(10):
-                row[k, lane] = segments[segment[lane], k]
-            clock[0, lane] = tau[lane]
-        if active == 0:
-            break
-
-        forcing_coefficients(row, get(clock, 0), a, n)
-        if rocking > 0:
-            rocking_coefficients(p, get(side, 0), a, c, w, n)
-        if rocking < active:
+        if asking or active == 0:
             for lane in range(LANES):
-                if member[lane] >= 0 and side[0, lane] == 0.0:
+                for k in range(7):
+                    memory[k, lane] = values[k, lane]
+                for k in range(6):
+                    numbers[k, lane] = places[k, lane]
+            return asking
+
+        forcing_coefficients(row, get(values, TAU), a, n)
+        if rocking > 0:
+            rocking_coefficients(p, get(values, SIDE), a, c, w, n)
+        for lane in range(LANES):
+            values[LENGTH, lane] = 0.0
+            j = places[MEMBER, lane]
+            if j >= 0:
+                if values[SIDE, lane] == 0.0:
                     for k in range(6):
-                        c1[k, 0] = x[k, lane]
+                        c1[k, 0] = c[k, 0, lane]
                     for k in range(n + 1):
                         a1[k] = a[k, lane]
-                    resting_coefficients(specimens[specimen_of[member[lane]]], a1, c1, n)
+                    resting_coefficients(specimens[specimen_of[j]], a1, c1, n)
                     for i in range(6):
                         for k in range(n + 1):
                             c[i, k, lane] = c1[i, k]
-        for lane in range(LANES):
-            length[0, lane] = 0.0
-            j = member[lane]
-            if j >= 0:
                 reach = np.hypot(p[B, lane], p[H_B, lane])
                 before = (abs(c[2, n - 1, lane]) + abs(c[3, n - 1, lane])) / reach + abs(c[5, n - 1, lane])
                 final = (abs(c[2, n, lane]) + abs(c[3, n, lane])) / reach + abs(c[5, n, lane])
-                length[0, lane] = step_length(
+                values[LENGTH, lane] = step_length(
                     specimens[specimen_of[j]],
-                    x[2, lane],
-                    x[3, lane],
-                    x[5, lane],
+                    c[2, 0, lane],
+                    c[3, 0, lane],
+                    c[5, 0, lane],
                     final,
                     before,
                     n,
                     tolerance,
-                    row[0, lane] - tau[lane],
+                    row[0, lane] - values[TAU, lane],
                 )
-        state_at(c, n, get(length, 0), following)
-        tail(c, n, get(length, 0), rests)
+        state_at(c, n, get(values, LENGTH), following)
+        tail(c, n, get(values, LENGTH), values)  # its first row is TAIL
         if watching > 0:
-            bends(c, n, get(length, 0), bounds)
+            bends(c, n, get(values, LENGTH), bounds)
 
         for lane in range(LANES):
-            j = member[lane]
+            j = places[MEMBER, lane]
             if j < 0:
                 continue
-            sg, h, remaining = side[0, lane], length[0, lane], row[0, lane] - tau[lane]
+            sg, h, remaining = values[SIDE, lane], values[LENGTH, lane], row[0, lane] - values[TAU, lane]
             reports[j, STEPS] += 1.0
-            status, event, direction, now = COMPLETED, NO_EVENT, 0.0, begin[lane, 0] + tau[lane]
+            status, event, direction, now = COMPLETED, NO_EVENT, 0.0, values[BEGIN, lane] + values[TAU, lane]
             start = max(0.0, peaks_from[j] - now)
             seen = start >= h
             if not h >= min(SHORTEST_STEP, remaining):
@@ -242,18 +258,18 @@ def advance_members(
                         c[4, 2, lane],
                         c[4, 3, lane],
                         c[4, 4, lane],
-                        rests[0, lane],
+                        values[TAIL, lane],
                         h,
-                        known[lane],
+                        places[KNOWN, lane],
                         theta_limit,
                     )
                 )
                 if clear and not seen:
                     most_1, most_2 = (
-                        max(abs(x[0, lane]), abs(after[0])),
-                        max(abs(x[1, lane] - x[0, lane]), abs(after[1] - after[0])),
+                        max(abs(c[0, 0, lane]), abs(after[0])),
+                        max(abs(c[1, 0, lane] - c[0, 0, lane]), abs(after[1] - after[0])),
                     )
-                    most_3, part = max(abs(x[4, lane]), abs(after[4])), 0.125 * h * h
+                    most_3, part = max(abs(c[4, 0, lane]), abs(after[4])), 0.125 * h * h
                     seen = (
                         most_1 + part * bounds[0, lane] <= reports[j, PEAKS]
                         and most_2 + part * bounds[1, lane] <= reports[j, PEAKS + 1]
@@ -267,7 +283,7 @@ def advance_members(
                         a1[k] = a[k, lane]
                 if not clear:
                     h, event, direction = first_event(
-                        specimens[specimen_of[j]], sg, c1, a1, n, h, known[lane], theta_limit, e
+                        specimens[specimen_of[j]], sg, c1, a1, n, h, places[KNOWN, lane], theta_limit, e
                     )
                     if event != NO_EVENT:
                         state_at(c1, n, h, after)
@@ -275,32 +291,32 @@ def advance_members(
                     status = FAILED
             if status == COMPLETED:
                 if not seen and now + h > peaks_from[j]:
-                    raise_peaks(c1, n, start, h, after, sg != 0.0, e, reports[j, PEAKS:])
+                    raise_peaks(c1, n, start, h, after, sg != 0.0, e, reports[j])
                 state = states[j]
                 for k in range(6):
                     state[k] = after[k]
-                tau[lane] = row[0, lane] if event == NO_EVENT and h == remaining else tau[lane] + h
-                now = begin[lane, 0] + tau[lane]
+                values[TAU, lane] = row[0, lane] if event == NO_EVENT and h == remaining else values[TAU, lane] + h
+                now = values[BEGIN, lane] + values[TAU, lane]
                 if event == NO_EVENT and sg * state[4] < 0.0:
                     event = IMPACT  # due to rounding, the end of the step is just past the root
-                known[lane] = 0
+                places[KNOWN, lane] = 0
                 if event == IMPACT:
                     reports[j, IMPACTS] += 1.0
-                    known[lane] = 1
+                    places[KNOWN, lane] = 1
                     acceleration = 0.0
                     for k in range(n, -1, -1):
                         acceleration = acceleration * h + a[k, lane]
                     strike(specimens[specimen_of[j]], state, acceleration, rest_angle)
-                    side[0, lane] = np.sign(state[5])
+                    values[SIDE, lane] = np.sign(state[5])
                     if reports[j, IMPACTS] >= impact_limit:
                         status = IMPACT_LIMIT
                 elif event == OVERTURNING:
                     status = OVERTURNED_A if sg > 0.0 else OVERTURNED_B
                 elif event == UPLIFT:
                     # angle and velocity are zero at the start of the motion: two known roots
-                    known[lane] = 2
-                    side[0, lane] = direction
+                    places[KNOWN, lane] = 2
+                    values[SIDE, lane] = direction
                     state[4] = state[5] = 0.0
             if status != COMPLETED:
                 reports[j, STATUS], reports[j, END] = status, now
-                member[lane] = -1
+                places[MEMBER, lane] = -1

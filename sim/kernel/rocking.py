@@ -34,7 +34,17 @@ from sim.kernel.steps import (
     strike,
 )
 from sim.kernel.taylor import WORK_ROWS, forcing_coefficients, resting_coefficients, rocking_coefficients
-from sim.kernel.watching import IMPACT, NO_EVENT, OVERTURNING, UPLIFT, first_event, raise_peaks, state_at
+from sim.kernel.watching import (
+    IMPACT,
+    NO_EVENT,
+    OVERTURNING,
+    UPLIFT,
+    first_event,
+    is_clear,
+    raise_peaks,
+    state_at,
+    tail,
+)
 
 STARTED, SIDE, KNOWN, BEGIN, LOST, LENGTH = range(6)
 """Indices in the first row of `advance`'s memory: whether it has begun, corner, number of known roots theta = 0, time
@@ -164,7 +174,13 @@ def advance(
                 if not h >= min(SHORTEST_STEP, allowed):
                     status = FAILED
                     break
-                h, event, direction = first_event(p, sg, c, a, n, h, known, theta_limit, e)
+                clear = False
+                if sg != 0.0 and n > 4:
+                    # most steps contain no event: test one bound for impact and overturning before searching
+                    tail(c, n, h, e)
+                    clear = is_clear(sg, c[4, 0], c[4, 1], c[4, 2], c[4, 3], c[4, 4], e[0], h, known, theta_limit)
+                if not clear:
+                    h, event, direction = first_event(p, sg, c, a, n, h, known, theta_limit, e)
                 state_at(c, n, h, following)
             if not is_physical(following):
                 status = FAILED
@@ -180,7 +196,7 @@ def advance(
                 place += 1
                 due = next_sample(row[0], begin, sample_times, divisions, place, filled, room)
             if found != GLIDED and now + h > peaks_from:
-                raise_peaks(c, n, max(0.0, peaks_from - now), h, following, sg != 0.0, e, peaks)
+                raise_peaks(c, n, max(0.0, peaks_from - now), h, following, sg != 0.0, e, report)
             for k in range(6):
                 x[k] = following[k]
             tau = row[0] if event == NO_EVENT and h == remaining else tau + h

@@ -97,7 +97,10 @@ def locate(
         power = 1 if y[7] != 0.0 else 2
         low_value = sg * y[7] if y[7] != 0.0 else 0.5 * sg * work[0, 7]
         if low_value <= 0.0:
-            work[4, :] = y
+            # element by element here and below: numba compiles the assignment of arrays together with the formatting of
+            # its error message, which takes a tenth of the whole compilation
+            for i in range(STATES):
+                work[4, i] = y[i]
             return 0.0
     else:
         low_value = max(margin(event, mode, y, held, noise, p, work), 0.0)
@@ -181,7 +184,8 @@ def substep(
             instant = locate(event, mode, y, limit, held, request, noise, p, work)
             if instant < 0.0:
                 advance(mode, y, left, held, request, noise, p, work)
-        y[:] = work[4]
+        for i in range(STATES):
+            y[i] = work[4, i]
         if instant < 0.0:
             return mode, reached
         left -= instant
@@ -220,7 +224,8 @@ def stream(
     work = np.empty((6, STATES))
     h = tick / substeps
     for i in range(requests.size):
-        samples[i, :STATES] = y
+        for k in range(STATES):
+            samples[i, k] = y[k]
         samples[i, STATES] = carried[1]
         held, velocity = carried[0] if p.lag > 0.0 else requests[i], y[1]
         for _ in range(substeps):

@@ -11,6 +11,7 @@ from sim.kernel.compiled import compiled, generic
 from sim.kernel.lanes import fma, get2, magnitude, put, zero
 from sim.kernel.packing import COUPLED, GRAVITY, H1, H_B, K_C, MASS, B
 from sim.kernel.roots import first_root, greatest_magnitude
+from sim.kernel.steps import PEAKS
 
 NO_EVENT, IMPACT, OVERTURNING, UPLIFT = range(4)
 """Endings of a step."""
@@ -69,10 +70,10 @@ def raise_peaks(
     following: NDArray[np.float64],
     rocking: bool,
     e: NDArray[np.float64],
-    peaks: NDArray[np.float64],
+    report: NDArray[np.float64],
 ) -> None:
-    """Raise `peaks` = [|u1|, |u2 - u1|, |theta|], shape (3,), to the greatest values in [start, h] if these are
-    greater.
+    """Raise the peaks |u1|, |u2 - u1|, |theta| in the `report` of a run to the greatest values in [start, h] if these
+    are greater.
 
     following : the state at `h`, shape (6,).
     """
@@ -86,14 +87,14 @@ def raise_peaks(
             slope, last = c[3, 0] - c[2, 0], following[3] - following[2]
         else:
             bend, begin, end, slope, last = bend_3, c[4, 0], following[4], c[5, 0], following[5]
-        most = max(abs(begin), abs(end))
-        if start == 0.0 and most > peaks[which] and slope * last > 0.0 and abs(slope) + abs(last) > bend * h:
-            peaks[which] = most  # the slope has no zero, so that the largest value is at one of the ends
+        most, peak = max(abs(begin), abs(end)), report[PEAKS + which]
+        if start == 0.0 and most > peak and slope * last > 0.0 and abs(slope) + abs(last) > bend * h:
+            report[PEAKS + which] = most  # the slope has no zero, so that the largest value is at one of the ends
         # most steps raise no peak: the distance from the chord is at most h^2 / 8 times the largest second derivative
-        elif most + 0.125 * h * h * bend > peaks[which]:
+        elif most + 0.125 * h * h * bend > peak:
             for k in range(n + 1):
                 e[k] = c[0, k] if which == 0 else (c[1, k] - c[0, k] if which == 1 else c[4, k])
-            peaks[which] = greatest_magnitude(e, n, start, h, peaks[which])
+            report[PEAKS + which] = greatest_magnitude(e, n, start, h, peak)
 
 
 @compiled("float64(float64, float64, float64)")
@@ -161,12 +162,6 @@ def first_event(
     event, direction = NO_EVENT, 0.0
     if sg == 0.0 and p[COUPLED] == 0.0:
         return h, event, direction
-    if sg != 0.0:
-        # most steps contain no event: test one bound for impact and overturning before searching
-        tail(c, n, h, e)
-        rest = e[0]
-        if n > 4 and is_clear(sg, c[4, 0], c[4, 1], c[4, 2], c[4, 3], c[4, 4], rest, h, known, theta_limit):
-            return h, event, direction
     for candidate in range(2):
         degree = n
         if sg == 0.0:

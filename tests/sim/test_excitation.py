@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from sim.errors import InvalidInput
 from sim.excitation import SampledRecord, SineProgram, Sweep
-from sim.kernel.taylor import forcing_coefficients
+from tests.sim import recurrences
 
 
 def acceleration(row: NDArray[np.float64], t: float) -> float:
@@ -22,7 +22,7 @@ def acceleration(row: NDArray[np.float64], t: float) -> float:
 def taylor(row: NDArray[np.float64], t: float, ahead: float) -> float:
     """a_g at t + ahead by the series of the kernel about t."""
     a = np.zeros(31)
-    forcing_coefficients(row, t, a, 30)
+    recurrences.forcing(row, t, a, 30)
     return float(np.polynomial.polynomial.polyval(ahead, a))
 
 

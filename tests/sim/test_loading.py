@@ -3,7 +3,7 @@
 import pytest
 
 from sim import loading
-from sim.loading import APART, BENCH, MODEL, STEADY, helped
+from sim.loading import APART, BENCH, MODEL, RECORDS, STEADY, helped
 from sim.waiting import wait
 
 
@@ -54,3 +54,4 @@ def test_there_is_no_helper_where_it_saves_no_time(monkeypatch: pytest.MonkeyPat
 def test_the_helper_compiles_modules_that_are_loaded() -> None:
     assert set(APART) <= set(BENCH)
     assert set(STEADY) < set(MODEL) < set(BENCH)
+    assert set(MODEL) < set(RECORDS)

@@ -1,16 +1,15 @@
 """Members side by side in lanes have the bits of single runs, whatever their neighbours do."""
 
-from typing import Any, cast
-
 import numpy as np
 import pytest
 
 from sim.ensemble import simulate_many
 from sim.excitation import Excitation, SampledRecord, SineProgram, Sweep
 from sim.kernel.lanes import fma, get, get2, put, put2, some, zero
-from sim.kernel.taylor import WORK_ROWS, forcing_coefficients, resting_coefficients, rocking_coefficients
+from sim.kernel.taylor import WORK_ROWS
 from sim.rocking import Motion, State, Status, simulate
 from sim.specimen import Specimen
+from tests.sim import recurrences
 
 RNG = np.random.default_rng(7)
 T = np.arange(0.0, 8.0, 0.01)
@@ -72,14 +71,8 @@ def test_a_member_that_fails_ends_alone() -> None:
 def test_without_compilation_the_series_is_the_same_to_rounding() -> None:
     n, p, row = 12, Specimen(beta=0.64).packed(), np.array([1.0, 1.2, 0.1, 0.0, 0.0, 0.3, 17.0, 0.2, 0.0, 0.0])
     found: list[np.ndarray] = []
-    for forcing, rocking, resting in (
-        (forcing_coefficients, rocking_coefficients, resting_coefficients),
-        (
-            cast(Any, forcing_coefficients).py_func,
-            cast(Any, rocking_coefficients).py_func,
-            cast(Any, resting_coefficients).py_func,
-        ),
-    ):
+    compiled = recurrences.forcing, recurrences.rocking, recurrences.resting
+    for forcing, rocking, resting in (compiled, [each.py_func for each in compiled]):
         a, c, r, w = np.zeros(n + 1), np.zeros((6, n + 1)), np.zeros((6, n + 1)), np.zeros((WORK_ROWS, n + 1))
         c[:, 0] = 0.003, 0.004, 0.05, -0.08, -0.02, -0.3
         r[:4, 0] = c[:4, 0]

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from sim.excitation import SineProgram, Sweep
 from sim.kernel import roots
 from sim.kernel.roots import evaluate, first_root, greatest_magnitude
-from sim.kernel.taylor import forcing_coefficients, resting_coefficients
 from sim.specimen import Specimen
+from tests.sim import recurrences
 
 COEFFICIENTS = st.lists(st.floats(-1.0, 1.0), min_size=3, max_size=12)
 GRID = np.linspace(0.0, 1.0, 4001)
@@ -93,8 +93,8 @@ def first_step(scale: float, duration: float, omega: tuple[float, float]) -> tup
     amplitude = specimen.uplift_acceleration * scale
     row = SineProgram([Sweep(duration, (amplitude, amplitude), omega)]).packed()[0]
     a, c = np.zeros(n + 1), np.zeros((6, n + 1))
-    forcing_coefficients(row, 0.0, a, n)
-    resting_coefficients(specimen.packed(), a, c, n)
+    recurrences.forcing(row, 0.0, a, n)
+    recurrences.resting(specimen.packed(), a, c, n)
     sizes = {k: abs(c[2, k]) + abs(c[3, k]) for k in (n - 1, n)}
     return c[0].copy(), min(duration, *((1e-14 / size) ** (1.0 / k) for k, size in sizes.items()))
 

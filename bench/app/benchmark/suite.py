@@ -20,7 +20,7 @@ from bench.progress import Progress, silent
 from bench.provenance import software
 from bench.unfinished import write_new
 from sim.errors import InvalidInput
-from sim.loading import load_model
+from sim.loading import RECORDS, load_model
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -232,7 +232,7 @@ def run_benchmark(
             raise InvalidInput(
                 "out", str(out), f"it already contains {name}; results are never overwritten, so choose another folder"
             )
-    load_model(progress)
+    load_model(progress, RECORDS)
     begin, started = time.perf_counter(), datetime.now().astimezone()
     sections: list[Section] = []
     for number, name in enumerate(parts):

@@ -17,7 +17,7 @@ from bench.prediction.seismic import SeismicCurve, band_of, gains_table, motions
 from bench.prediction.seismic import band_study as study
 from bench.progress import Progress
 from sim.knowledge import SpecimenKnowledge
-from sim.loading import load_model
+from sim.loading import RECORDS, load_model
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -52,7 +52,7 @@ def seismic(
     progress: Progress,
 ) -> Result:
     """Gain curves, one for each record."""
-    load_model(progress)
+    load_model(progress, RECORDS)
     curves = seismic_curves(subject.specimen, subject.records, request, subject.configuration, subject.known, progress)
     band = band_of(request.table_band, subject.configuration)
     words = "none, the records unchanged" if band is None else f"{band[0]:g} to {band[1]:g} Hz"

@@ -1,0 +1,112 @@
+"""Many motions at once under excitations with segments of linear acceleration, such as records.
+
+While a block rests at the start of such a segment, whole segments are taken by the exact step of `sim.kernel.resting`;
+all other steps are those of `sim.kernel.members`. This module is apart, because sines alone do not need it.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.kernel.compiled import compiled
+from sim.kernel.lanes import LANES
+from sim.kernel.members import (
+    ASKS,
+    BEGIN,
+    KNOWN,
+    LOST,
+    MEMBER,
+    MEMBERS,
+    MET,
+    SEGMENT,
+    STEPPED,
+    Array,
+    advance_lanes,
+    end_segment,
+    is_linear,
+)
+from sim.kernel.resting import LOOK_INSIDE, MUST_STEP, TABLE_ROWS, glide, propagator
+from sim.kernel.steps import PEAKS, STEPS
+from sim.kernel.taylor import forcing_coefficients, resting_coefficients
+from sim.kernel.watching import raise_peaks
+
+
+@compiled(f"void({MEMBERS}, float64[:,::1], int64[:,::1])")
+def advance_with_rest(
+    specimens: Array,
+    specimen_of: NDArray[np.int64],
+    segments: Array,
+    spans: NDArray[np.int64],
+    states: Array,
+    n: int,
+    tolerance: float,
+    theta_limit: float,
+    rest_angle: float,
+    peaks_from: Array,
+    impact_limit: int,
+    reports: Array,
+    values: Array,
+    places: NDArray[np.int64],
+) -> None:
+    """Take the exact steps that `advance_lanes` asked for, and call it, until every member has ended."""
+    tables, no_samples = np.zeros((LANES, TABLE_ROWS, 6)), np.empty((0, 6))
+    a1, c1, after, e = np.zeros(n + 1), np.zeros((6, n + 1)), np.zeros(6), np.zeros(n + 1)
+    asking = True
+    while asking:
+        for lane in range(LANES):
+            while places[ASKS, lane] != 0:
+                j, i = places[MEMBER, lane], places[SEGMENT, lane]
+                watched_from = float(peaks_from[j])
+                specimen, table = specimens[specimen_of[j]], tables[lane]
+                length, found = segments[i, 0], MUST_STEP
+                places[ASKS, lane] = 0
+                # a table is worth its cost from the second segment of equal length on; a negative length means that the
+                # table has been computed
+                if values[MET, lane] == length:
+                    values[MET, lane] = -length
+                    propagator(specimen, length, n, tolerance, table)
+                elif values[MET, lane] != -length:
+                    values[MET, lane] = length
+                if values[MET, lane] == -length and table[0, 0] > 0.0:
+                    e[0], e[1] = values[BEGIN, lane], values[LOST, lane]
+                    own, peaks = segments[: spans[j, 1]], reports[j, PEAKS:]
+                    i, found = glide(
+                        specimen, table, own, i, states[j], np.inf, watched_from, peaks, e, after, no_samples, 0
+                    )
+                    values[BEGIN, lane], values[LOST, lane] = e[0], e[1]
+                    reports[j, STEPS] += i - places[SEGMENT, lane]
+                    places[SEGMENT, lane] = i
+                    if i < spans[j, 1] and found == LOOK_INSIDE:
+                        # the exact step is known, so that the polynomial is needed only for the peaks within it
+                        length = segments[i, 0]
+                        forcing_coefficients(segments[i], 0.0, a1, n)
+                        for k in range(6):
+                            c1[k, 0] = states[j, k]
+                        resting_coefficients(specimen, a1, c1, n)
+                        after[4] = after[5] = 0.0
+                        if values[BEGIN, lane] + length > watched_from:
+                            start = max(0.0, watched_from - values[BEGIN, lane])
+                            raise_peaks(c1, n, start, length, after, False, e, reports[j])
+                        for k in range(4):
+                            states[j, k] = after[k]
+                        reports[j, STEPS] += 1.0
+                        places[KNOWN, lane] = 0
+                        end_segment(values, places, lane, length)
+                        places[ASKS, lane] = i + 1 < spans[j, 1] and is_linear(segments[i + 1])
+                if found == MUST_STEP:
+                    places[STEPPED, lane] = i
+        asking = advance_lanes(
+            specimens,
+            specimen_of,
+            segments,
+            spans,
+            states,
+            n,
+            tolerance,
+            theta_limit,
+            rest_angle,
+            peaks_from,
+            impact_limit,
+            reports,
+            values,
+            places,
+        )
