@@ -219,7 +219,7 @@ class Identified(Parameters):
         return Identified(findings=kept.findings + findings, correlations=still + correlations)
 
     def without(self, *names: str) -> "Identified":
-        """Remove the findings `names` and their correlations."""
+        """A copy without the findings `names` and their correlations."""
         return Identified(
             findings=tuple(finding for finding in self.findings if finding.name not in names),
             correlations=tuple(one for one in self.correlations if not one.pair & set(names)),

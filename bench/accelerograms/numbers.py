@@ -100,7 +100,7 @@ def _refuse_empty(text: RecordText, first: int, lines: list[str]) -> None:
 
 
 def _refuse_gaps(text: RecordText, first: int, lengths: list[int]) -> None:
-    """Raise InvalidInput for a row, other than the last, whose length differs from the first."""
+    """Raise InvalidInput for a row whose length differs from that of the first; only the last row may be shorter."""
     for index, length in enumerate(lengths[1:], 1):
         if length != lengths[0] and (index < len(lengths) - 1 or length > lengths[0]):
             raise text.refusal(first + index, "its length differs from the rows above: samples are missing")

@@ -90,7 +90,8 @@ def linear_part(series: Array, orbit: Array, bound: float = BOUND) -> slice:
 
 
 def dominant_multiplier(series: Array) -> Multiplier | None:
-    """Slowest pair with a considerable part in `series`, shape (n, m), of successive cycles at a constant drive.
+    """Pair of multipliers with the largest modulus, among those that contribute substantially to `series`, shape
+    (n, m), of successive cycles at a constant drive.
 
     None if there are fewer than `SHORTEST` cycles, or if no pair is significant. Raises ValueError for values that are
     not finite.

@@ -187,7 +187,7 @@ def _classify(item: str, annotation: Any) -> tuple[Kind, bool]:
         if len(others) == 1:
             return _classify(item, others[0])[0], True
     elif inspect.isclass(annotation):
-        # bool is an int, and a string enumeration is a str: the order matters
+        # bool is a subclass of int and must come first; a string enumeration is recorded as a str
         for types, kind in ((bool, Kind.SWITCH), (int, Kind.WHOLE), (float, Kind.REAL), (str, Kind.TEXT)):
             if issubclass(annotation, types):
                 return kind, False

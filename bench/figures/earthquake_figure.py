@@ -148,7 +148,7 @@ def _draw_points(panel: "Axes", rows: list[dict[str, Any]]) -> None:
             color=SKY,
             linewidth=4.0,
             zorder=2,
-            label="95 % interval of the measured value",
+            label="95 % interval expected for the measured value",
         )
     known = [row for row in measured if row["alpha_2_predicted"] is not None]
     if known:

@@ -154,7 +154,7 @@ def replay(
     recording, course = DataFileRecording(record), RecordedCourse(record)
     comparison, requests = Comparison(record, course), Requests()
     with ReplayRig(recording, clock=clock, course=course) as rig:
-        # last, so that requests follow when all other subscribers have received the earlier events
+        # last, so that all other subscribers have received an event before the request that follows it is made
         stream = EventStream(clock, [comparison, *subscribers, RequestReplay(course, requests)])
         engine = configured_engine(rig, configuration, stream, requests, RecordedOperator(course))
         for warning in course.first_warnings:

@@ -117,11 +117,11 @@ class DaqSession:
         with self._lock:
             self._require(_State.IDLE, "prepare")
             if self._lost:
-                raise ConnectionLost("prepare is refused: the device was lost in an earlier run; open a new session")
+                raise ConnectionLost("the run cannot be prepared: the device was lost earlier; open a new session")
             if self._tasks.was_reset:
-                raise ConnectionLost("prepare is refused: the device had to be reset; open a new session")
+                raise ConnectionLost("the run cannot be prepared: the device had to be reset; open a new session")
             if not self._tasks.inputs.is_owner():
-                raise ConnectionLost("prepare is refused: another client has taken the device; open a new session")
+                raise ConnectionLost("the run cannot be prepared: another client has the device; open a new session")
             # repeat a stop that has failed
             self._rest()
             self._state, self._at_rest, self._cut = _State.PREPARED, False, False

@@ -182,7 +182,7 @@ class Tasks:
             if clock.now() > deadline:
                 opened = [name for name, is_good in good.items() if not is_good]
                 text = f"{', '.join(opened)} not good {delay:g} s after the enable line was closed"
-                raise SafetyInputOpen(f"prepare is refused: {text}", opened)
+                raise SafetyInputOpen(f"the run cannot be prepared: {text}", opened)
             clock.wait_until(clock.now() + _LOOK)
             if self.watchdog is not None:
                 self.watchdog.reset()
@@ -204,7 +204,7 @@ def _connected(given: AnalogInput, used: Sequence[FoundDevice]) -> Connected:
 
 def _require_not_cut(is_cut: Callable[[], bool]) -> None:
     if is_cut():
-        raise RigError("prepare is refused: the enable line was cut while the run was being prepared")
+        raise RigError("the run cannot be prepared: the enable line was cut during the preparation")
 
 
 def _quietly(step: Callable[[], None]) -> None:

@@ -219,8 +219,8 @@ class Tracks:
 
 
 def longest_wait(lead: float, passed: float) -> float:
-    """Longest wait for late values [s] of a block whose last sample was taken `passed` [s] ago; from then on, the
-    queued drive lasts for `lead` [s].
+    """Longest wait [s] for late values of a block whose last sample was taken `passed` [s] ago; counted from that
+    sample, the queued drive lasts for `lead` [s].
     """
     left = max(lead - passed, 0.0)
     return min(max(_SHARE * left, left - _RESERVE), max(_LONGEST - passed, _LEAST))

@@ -148,7 +148,7 @@ def _remarks(found: Compared, observed: Observed) -> Iterator[str]:
             "not topple"
         )
     elif found.chance > CHANCE_NOTE:
-        yield f"the block did not topple, but {found.chance:.0%} of the draws do"
+        yield f"the block did not topple, but it topples in {100.0 * found.chance:.0f} % of the draws"
     if found.agrees is False:
         yield "the difference from the prediction exceeds the uncertainty"
     if found.chaotic:

@@ -147,8 +147,8 @@ class RockingRun:
     def _watching(self) -> str:
         return (
             "Remove the spring and set the block upright on its base, without contact with other parts. Aim laser 2 at "
-            f"its face, square to it, {1e3 * self._parameters.height:.0f} mm above the table, near the middle of its "
-            "range."
+            f"the block's face, square to it, {1e3 * self._parameters.height:.0f} mm above the table, with the face "
+            "near the middle of the laser's range."
         )
 
     def _tilt(self, number: int, tilt: PlannedTilt) -> Generator[Step, Outcome, None]:

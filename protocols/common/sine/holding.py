@@ -67,8 +67,8 @@ class HoldCycle(Event):
 
 
 def prepared(orbit: Orbit | None, shaker: Shaker | None, harmonics: int) -> StabiliserDesign | None:
-    """Design of the stabiliser, whose computation takes too long while the table is driven. None if there is no orbit
-    on the table, or if no control stabilises it.
+    """Design of the stabiliser, computed in advance because the computation takes too long to be done while the table
+    is driven. None if there is no orbit on the table, or if no control stabilises it.
     """
     if orbit is None:
         return None
