@@ -121,7 +121,9 @@ class DaqSession:
             if self._tasks.was_reset:
                 raise ConnectionLost("the run cannot be prepared: the device had to be reset; open a new session")
             if not self._tasks.inputs.is_owner():
-                raise ConnectionLost("the run cannot be prepared: another client has the device; open a new session")
+                raise ConnectionLost(
+                    "the run cannot be prepared: another client has taken the device; open a new session"
+                )
             # repeat a stop that has failed
             self._rest()
             self._state, self._at_rest, self._cut = _State.PREPARED, False, False
