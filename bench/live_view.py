@@ -7,7 +7,7 @@ after each result.
 
 from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Any, Literal, TypeAlias, TypeVar
 
 import numpy as np
@@ -24,8 +24,8 @@ Array = NDArray[np.float64]
 E = TypeVar("E", bound=Event)
 
 FITS, KEPT = 60, 2000
-"""Largest number of stored fits, which contain recordings, and of stored events of each other type. All points are
-stored.
+"""Largest number of stored events of a type with arrays, such as fits with recordings, and of stored events of each
+other type. All points are stored.
 """
 MOST = 6
 """Largest number of curves that a panel shows of one fit."""
@@ -149,6 +149,11 @@ class Checklist:
 LiveView: TypeAlias = Sequence[Panel | GainCurve | Checklist]
 
 
+def _is_large(event: Event) -> bool:
+    values = (getattr(event, each.name) for each in fields(event))
+    return isinstance(event, FitFinished) or any(isinstance(value, np.ndarray) for value in values)
+
+
 @dataclass(eq=False)
 class LiveRun:
     """The stored events of a run up to now, with its parameters and configuration. `point` is the class of its points;
@@ -167,7 +172,7 @@ class LiveRun:
             return False
         kind = type(event)
         if kind not in self._kept:
-            limit = FITS if kind is FitFinished else None if kind is PointFinished else KEPT
+            limit = FITS if _is_large(event) else None if kind is PointFinished else KEPT
             self._kept[kind] = deque(maxlen=limit)
         self._kept[kind].append(event)
         return True

@@ -242,6 +242,7 @@ RUNS_AGAINST_TIP = "Makes the selected run the reference of the comparison (Ctrl
 RUNS_FOLDER, RUNS_FOLDER_TIP = "Folder …", "Shows the runs in another folder and in the folders below it."
 RUNS_BACK, RUNS_BACK_TIP = "Opened run", "Returns to the opened run (Ctrl+B)."
 RUNS_ALL, RUNS_ALL_TIP = "All runs", "Shows the list of all runs (Ctrl+B)."
+RUNS_HELD = "Files of the list are opened after the run."
 RUNS_COUNT = "{shown} of {all} files in {folder}"
 RUNS_REFERENCE = "reference: {name}, compared: {n}"
 RUNS_READING = "reading {n}"
@@ -344,10 +345,14 @@ LAST_VALUES_NONE = "No plan of this protocol has been checked yet."
 LAST_VALUES_SHOWN = "Values of the last checked plan."
 PRESET, PRESET_HINT = "Presets", "preset: select or name"
 PRESET_TIP = "Select a preset to fill the form with it, or type a name to save the values of the form."
-PRESET_SAVE, PRESET_SAVE_TIP = "Save", "Saves the values of the form as the named preset; an existing one is replaced."
+PRESET_SAVE, PRESET_SAVE_TIP = (
+    "Save",
+    "Saves the values of the form as the named preset; an existing one that was not loaded, after a second press.",
+)
 PRESET_DELETE, PRESET_DELETE_TIP = "Delete", "Deletes the file of the named preset; the form keeps its values."
 PRESET_LOADED, PRESET_SAVED, PRESET_DELETED = "Preset {name}.", "Saved: {path}", "Deleted: {name}"
 PRESET_NO_NAME, PRESET_NONE = "type a name first", "there is no preset with this name"
+PRESET_EXISTS = "A preset {name} exists; press Save again to replace it."
 PRESET_INVALID = "Invalid values are marked in the form."
 PRESET_UNKNOWN = "Not in this protocol: {values}."
 HELP, HELP_TIP = "?", "Help on the parameter whose field has the focus (F1)."

@@ -31,6 +31,7 @@ class PresetBar(QWidget):
         self._presets = None if folder is None else Presets(folder)
         self._protocol: Protocol[Any] | None = None
         self._form: Form | None = None
+        self._loaded = self._replaced = ""
         self.name = QComboBox(editable=True, insertPolicy=QComboBox.InsertPolicy.NoInsert)
         self.name.setAccessibleName(texts.PRESET)
         self.name.setToolTip(texts.PRESET_TIP)
@@ -70,6 +71,7 @@ class PresetBar(QWidget):
         changed, self._protocol, self._form = protocol is not self._protocol, protocol, form
         form.edited.connect(self._edited)
         if changed:
+            self._loaded = self._replaced = ""
             self._say("", "calm")
             self._list("")
         self._refresh()
@@ -101,12 +103,13 @@ class PresetBar(QWidget):
             words.append(texts.PRESET_UNKNOWN.format(values=shown))
         if form is not None and form.refused:
             words.append(texts.PRESET_INVALID)
-        self._say(" ".join(words), "alarm" if len(words) > 1 else "calm")
+        self._say(" ".join(filter(None, words)), "alarm" if len(words) > 1 else "calm")
 
     def load(self) -> None:
         """Fill the form with the named preset."""
         presets, protocol, name = self._presets, self._protocol, self.name.currentText().strip()
         if presets is not None and protocol is not None and self._listed(name):
+            self._loaded, self._replaced = name, ""
             self._fill(lambda: presets.load(protocol.name, name), texts.PRESET_LOADED.format(name=name))
 
     def _fill_last(self) -> None:
@@ -126,12 +129,17 @@ class PresetBar(QWidget):
         presets, protocol, form, name = self._presets, self._protocol, self._form, self.name.currentText().strip()
         if presets is None or protocol is None or form is None:
             return
+        if self._listed(name) and name not in (self._loaded, self._replaced):
+            self._replaced = name
+            self._say(texts.PRESET_EXISTS.format(name=name), "wait")
+            return
         try:
             path = presets.save(protocol, name, form.typed())
         except RockbenchError as error:
             self._say(str(error), "alarm")
         else:
             self._say(texts.PRESET_SAVED.format(path=path), "calm")
+            self._loaded, self._replaced = name, ""
             self._list(name)
 
     def _delete(self) -> None:
@@ -151,7 +159,8 @@ class PresetBar(QWidget):
         self._refresh()
 
     def _listed(self, name: str) -> bool:
-        return name in [self.name.itemText(place) for place in range(self.name.count())]
+        # file names that differ in case only are the same on some systems
+        return name.casefold() in [self.name.itemText(place).casefold() for place in range(self.name.count())]
 
     def _list(self, name: str) -> None:
         """List the presets of the protocol, and show `name`."""

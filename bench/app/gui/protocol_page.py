@@ -60,7 +60,7 @@ class ProtocolPage(QWidget):
         self._controller, self._configuration, self._entries = controller, configuration, tuple(entries)
         self._first_values = {"omega": (16.0,), "beta": (0.4,)} if tour else None
         self._checked: PlanChecked | None = None
-        self._checking = self._began = False
+        self._checking = self._began = self._unattended = False
         self._edited_test: Queued | None = None
         self._made: Path | None = None
         # created first, so that the values follow the protocol in the tab order
@@ -133,6 +133,7 @@ class ProtocolPage(QWidget):
         try:
             plan = self._plan_check()
         except RockbenchError as error:
+            self._show_plan()
             self.plan.refuse(str(error))
             return
         self._checked, self._checking = None, True
@@ -152,6 +153,7 @@ class ProtocolPage(QWidget):
                 self._made = make_folder(plan.out)
                 plan = replace(plan, out=self._made)
         except RockbenchError as error:
+            self._show_plan()
             self.plan.refuse(str(error))
             return
         self._began = True
@@ -176,6 +178,7 @@ class ProtocolPage(QWidget):
         self._edited_test = test
         self.choice.setCurrentIndex([entry.name for entry in self._entries].index(test.protocol))
         self._show_form(Form(self.entry.parameters, test.parameters))
+        self.presets.report("")
         self.options.load(test)
         self.add.setText(texts.SAVE)
         self.add.setToolTip(texts.SAVE_TIP.format(number=number))
@@ -210,7 +213,12 @@ class ProtocolPage(QWidget):
             self.add.setToolTip(unplanned or texts.ADD_TIP)
         self.check.setEnabled(not self._checking and not self.form.refused)
         self.check.setToolTip(texts.START_BAD if self.form.refused else texts.CHECK_TIP)
-        self.plan.warn(texts.UNATTENDED if self.options.unattended else "")
+        unattended = self.options.unattended
+        if unattended and not self._unattended:
+            # the warning must not be hidden behind the help
+            self._show_plan()
+        self._unattended = unattended
+        self.plan.warn(texts.UNATTENDED if unattended else "")
 
     def _show_plan(self) -> None:
         self.right.setCurrentWidget(self.plan)

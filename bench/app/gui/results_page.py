@@ -157,17 +157,28 @@ class ResultsPage(QWidget):
 
     def _open_run(self, path: Path) -> None:
         """Open a run of the list: alone, unless two or more are compared."""
-        if self.show_file(path, place=Place.TOO if len(self.files.ticked) > 1 else Place.ALONE):
+        if not self._held(path) and self.show_file(
+            path, place=Place.TOO if len(self.files.ticked) > 1 else Place.ALONE
+        ):
             self.show_run()
 
     def _tick_run(self, path: Path, on: bool) -> None:
-        if self.files.holds(path) or self.show_file(path, place=Place.ASIDE):
+        if self.files.holds(path) or (not self._held(path) and self.show_file(path, place=Place.ASIDE)):
             self.files.tick(path, on=on)
 
     def _compare_against(self, path: Path) -> None:
-        if self.files.holds(path) or self.show_file(path, place=Place.ASIDE):
+        if self.files.holds(path) or (not self._held(path) and self.show_file(path, place=Place.ASIDE)):
             self.files.make_first(path)
             self.files.tick(path, on=True)
+
+    def _held(self, path: Path) -> bool:
+        """Whether the file must stay closed until the end of a run: a window that waits for a slow disk answers neither
+        the session nor STOP.
+        """
+        held = self._controller.running and not self.files.holds(path)
+        if held:
+            self.browser.warn(texts.RUNS_HELD)
+        return held
 
     def _choose(self) -> None:
         file = self.files.chosen

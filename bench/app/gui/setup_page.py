@@ -113,6 +113,7 @@ class SetupPage(QWidget):
         self._controller = controller
         self.configuration, self.path = configuration, path
         self._given, self._used = configuration, dict[str, Path]()
+        self._notices = () if path is None else former_keys(path)
         self.source = QLabel(wordWrap=True)
         self.open_file, self.open_specimen = QPushButton(texts.OPEN_CONFIGURATION), QPushButton(texts.OPEN_SPECIMEN)
         self.recent = RecentFiles(settings)
@@ -138,11 +139,11 @@ class SetupPage(QWidget):
     def open_configuration(self, path: Path) -> None:
         """Use the configuration in a file; for an invalid file, show the reason and keep the current configuration."""
         try:
-            configuration = read_configuration(path)
+            configuration, notices = read_configuration(path), former_keys(path)
         except RockbenchError as error:
             self._say(f"▲ {texts.CONFIGURATION_KEPT.format(text=error)}", "alarm")
             return
-        self._given, self._used = configuration, {}
+        self._given, self._used, self._notices = configuration, {}, notices
         self._use(configuration, path)
 
     def open_identified(self, path: Path) -> None:
@@ -180,8 +181,7 @@ class SetupPage(QWidget):
     def _show(self) -> None:
         lines = [f"{texts.CONFIGURATION}: {self.path or texts.VIRTUAL}"]
         lines += [texts.IDENTIFIED.format(kind=kind.capitalize(), path=path) for kind, path in self._used.items()]
-        if self.path is not None:
-            lines += former_keys(self.path)
+        lines += self._notices
         self._say("\n".join(lines), "calm")
         if self.path is not None:
             self.recent.add(self.path)

@@ -17,13 +17,15 @@ from bench.app.gui.controller import Controller
 from bench.app.gui.live_plot import LivePlot
 from bench.app.gui.run_page import RunPage
 from bench.app.ipc.messages import Opened, Published, Run, Traces
+from bench.config.model import BenchConfiguration
 from bench.events import OperatorAnswered, PointFinished, Progress, SpecimenMounted
 from bench.findings import FitFinished, TableIdentified
 from bench.live_values import LiveValue, RunningGain
-from bench.live_view import LiveRun, LiveView, Panel
+from bench.live_view import FITS, LiveRun, LiveView, Panel
 from bench.protocol import RunView
 from drivers.rig import OperatorTask
 from protocols.common.replicate import TableMotion
+from protocols.harmonic.protocol import HarmonicParameters, HarmonicPoint
 from sim.specimen import Frame
 from tests.bench.app.gui.short_runs import PARAMETERS, Moment, ShortRun, short_run
 
@@ -367,3 +369,12 @@ def test_without_a_declaration_live_values_are_curves_over_time(controller: Cont
     assert period.figure.curves[0].y.tolist() == [0.5, 0.7]
     assert mass.figure.y_label == "[kg]"
     page.close()
+
+
+def test_events_with_arrays_are_kept_in_a_limited_number() -> None:
+    run = LiveRun(HarmonicPoint, HarmonicParameters(), BenchConfiguration())
+    for number in range(FITS + 5):
+        run.follow(TableMotion("record", f"pass {number}", np.zeros(3), np.zeros(3), np.zeros(3)))
+    kept = run.events(TableMotion)
+    assert len(kept) == FITS
+    assert kept[-1].play == f"pass {FITS + 4}"

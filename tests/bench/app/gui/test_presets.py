@@ -104,6 +104,23 @@ def test_a_preset_is_saved_loaded_and_deleted(qtbot: QtBot, tmp_path: Path) -> N
     assert page.form.parameters() == expected, "the form keeps its values"
 
 
+def test_a_preset_that_was_not_loaded_is_replaced_after_a_second_press_only(qtbot: QtBot, tmp_path: Path) -> None:
+    file = tmp_path / "presets" / "harmonic" / "Monday.toml"
+    file.parent.mkdir(parents=True)
+    file.write_text("# by hand\nomega = [12.5]\n", encoding="utf-8")
+    page = _opened(qtbot, tmp_path).protocol
+    page.choice.setCurrentText("harmonic")
+    page.presets.name.setEditText("monday")
+    qtbot.mouseClick(page.presets.save, Qt.MouseButton.LeftButton)
+    assert "# by hand" in file.read_text(encoding="utf-8")
+    assert page.presets.message.text() == texts.PRESET_EXISTS.format(name="monday")
+    page.presets.name.setEditText("Monday")
+    qtbot.mouseClick(page.presets.save, Qt.MouseButton.LeftButton)
+    assert "# by hand" in file.read_text(encoding="utf-8")
+    qtbot.mouseClick(page.presets.save, Qt.MouseButton.LeftButton)
+    assert "# by hand" not in file.read_text(encoding="utf-8")
+
+
 def test_values_that_no_longer_hold_are_shown_with_the_reason(qtbot: QtBot, tmp_path: Path) -> None:
     folder = tmp_path / "presets" / "free-vibration"
     folder.mkdir(parents=True)

@@ -164,6 +164,23 @@ def test_a_run_is_opened_ticked_and_made_the_reference(page: ResultsPage, qtbot:
     assert page.views.currentWidget() is page.view
 
 
+def test_no_file_of_the_list_is_opened_during_a_run(
+    page: ResultsPage, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    browser = page.browser
+    monkeypatch.setattr(Controller, "running", True)
+    browser.table.setCurrentIndex(browser.model.index(_names(browser).index("monday"), 0))
+    qtbot.keyClick(browser.table, Qt.Key.Key_Return)
+    browser.model.setData(
+        browser.model.index(_names(browser).index("tuesday"), 0),
+        Qt.CheckState.Checked.value,
+        Qt.ItemDataRole.CheckStateRole,
+    )
+    assert page.files.ticked == []
+    assert page.views.currentWidget() is browser
+    assert texts.RUNS_HELD in browser.message.text()
+
+
 def test_one_key_leads_to_the_list_and_back(page: ResultsPage, qtbot: QtBot) -> None:
     with qtbot.waitActive(page):
         page.activateWindow()
