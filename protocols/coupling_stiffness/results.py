@@ -1,5 +1,5 @@
 # pyright: reportUnknownMemberType=false
-"""Results of the springs: text table, figure, and report section."""
+"""Results of the coupling-stiffness test: text table, figure, and report section."""
 
 from collections.abc import Sequence
 from math import tau

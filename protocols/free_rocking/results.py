@@ -41,7 +41,7 @@ _FIT = "impacts of "
 """Prefix for the names of fits of single impacts."""
 
 _MOTION = (("r_motion", "r_exp"), ("r_motion_uncertainty", "r_exp_uncertainty"))
-"""Field names, with their names in older files, whose result is always from the fit."""
+"""Fields whose values always come from the fit, each with its name in older files."""
 
 
 @dataclass(frozen=True, eq=False)

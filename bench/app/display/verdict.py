@@ -28,7 +28,9 @@ def verdict_of(view: RunView, finished: Parameters) -> str:
 
 
 def running_verdict(event: Estimate | RunningGain | LiveValue) -> str:
-    """A running value with its prediction, its difference from the prediction, and the measured duration."""
+    """A running value with its prediction, its difference from the prediction, and, for a gain, the cycles or seconds
+    measured so far.
+    """
     if isinstance(event, LiveValue):
         label = typeset(event.label)
         value, effort = f"{label}  {measurement(event.value, event.uncertainty, unit_text(event.unit))}", ""

@@ -46,7 +46,7 @@ class QueueRunner(QObject):
         self.path = None if store is None else store.path
         self._owner = None if store is None else Owner(store.path, texts.QUEUE_OWNER)
         self.going = False
-        """Whether the next test begins after the current one."""
+        """Whether the queue continues with the next test when the current one ends."""
         self.why = ""
         """Reason for the pause of the queue; empty unless a problem caused it."""
         try:

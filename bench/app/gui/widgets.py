@@ -186,7 +186,7 @@ def colour_axes(plot: Any, theme: Theme) -> None:
 
 
 def round_down(value: float) -> float:
-    """The largest short number, such as 0.3 or 15, not above `value`, which is positive."""
+    """The largest round number, such as 0.3 or 15, not above `value`, which is positive."""
     decade = 10.0 ** floor(log10(value))
     digits = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)
     return max(digit * decade for digit in digits if digit * decade <= value * (1.0 + 1e-9))
