@@ -94,7 +94,7 @@ def release(
 
 def parts_of(found: Multiplier, amplitude_slope: float, table_scale: float) -> dict[str, float]:
     """Standard uncertainties of the modulus by contribution, largest first: noise of the cycles, and the amplitude of
-    the table, of which `table_scale` is the relative standard uncertainty. The latter is 0 if the slope is unknown (NaN).
+    the table, of which `table_scale` is the relative standard uncertainty. The latter is 0 for an unknown slope (NaN).
     """
     slope = 0.0 if amplitude_slope != amplitude_slope else abs(amplitude_slope)
     parts = {
