@@ -3,7 +3,7 @@
 The code that creates such a file or folder removes it, or renames it when it is complete. The list here is needed only
 where no `finally` runs: when an interrupted process ends because its main thread does not respond, see
 `bench.app.cli.interrupt`. A second list contains the complete results, which are listed in the message of a later
-interrupt.
+interrupt, and a third one the computations that a signal has broken off, whose objects are kept.
 """
 
 import os
@@ -13,6 +13,7 @@ from collections.abc import Callable, Generator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from tempfile import gettempdir
+from types import FrameType
 from uuid import uuid4
 
 from sim.errors import InvalidInput, RockbenchError
@@ -26,6 +27,19 @@ _paths: set[Path] = set()
 _reserved: set[Path] = set()
 _names: dict[Path, Path] = {}
 """Final name of every result that has been renamed or is about to be renamed, by its temporary name."""
+_broken_off: list[FrameType] = []
+
+
+def keep_broken_off(frame: FrameType | None) -> None:
+    """Keep all objects of the computation that the caller, a signal handler, is about to break off in `frame`.
+
+    The exception may be raised while a library hands over native memory: llvmlite links two compiled modules in native
+    code and marks the second one as consumed in the next statement. A destructor called between the two frees that
+    memory twice, which ends the process with a segmentation fault.
+    """
+    if frame is not None:
+        # a kept frame keeps its local variables, and its callers
+        _broken_off.append(frame)
 
 
 @contextmanager

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, NoReturn
 
 from bench.app.cli.closing import watch_console
 from bench.app.cli.output import print_error, report_error
-from bench.unfinished import completed, remove_unfinished
+from bench.unfinished import completed, keep_broken_off, remove_unfinished
 
 if TYPE_CHECKING:
     from bench.engine.interface import Requests
@@ -47,10 +47,11 @@ class Interrupts:
         """128 + the number of the signal, the shells' convention (Ctrl-C: 130); None without a signal."""
         return None if self.first is None else 128 + self.first
 
-    def __call__(self, number: int, frame: FrameType | None) -> None:  # noqa: ARG002 - the signature is Python's
+    def __call__(self, number: int, frame: FrameType | None) -> None:
         """Raise KeyboardInterrupt at the first signal; further ones must not interrupt the clean-up."""
         if self.first is None:
             self.first = number
+            keep_broken_off(frame)
             raise KeyboardInterrupt
 
 
@@ -77,7 +78,7 @@ class RunInterrupts(Interrupts):
         """Whether no rig is open: the run is still being planned, or has ended."""
         return self._requests.rig_closed
 
-    def __call__(self, number: int, frame: FrameType | None) -> None:  # noqa: ARG002 - the signature is Python's
+    def __call__(self, number: int, frame: FrameType | None) -> None:
         requests, first = self._requests, self.first is None
         if first:
             self.first = number
@@ -88,6 +89,7 @@ class RunInterrupts(Interrupts):
         if self._asking():
             raise KeyboardInterrupt
         if first and requests.breaking is not None:
+            keep_broken_off(frame)
             raise requests.breaking()
 
 

@@ -19,6 +19,7 @@ from bench.app.preflight import compile_run, prepare
 from bench.app.session import run_session
 from bench.config.model import BenchConfiguration
 from bench.engine.interface import Requests, Unattended
+from bench.unfinished import keep_broken_off
 from sim.errors import CauseCode, InvalidInput, RockbenchError, cause_of
 from sim.waiting import STEP
 
@@ -50,7 +51,9 @@ def serve(connection: Connection) -> None:
         else:
             last = _check_plan(assignment)
     except KeyboardInterrupt:
-        last = Refused(f"ended before anything moved: {requests.reason}", requests.cause)
+        host.close(Refused(f"ended before anything moved: {requests.reason}", requests.cause), FAREWELL)
+        # a normal exit would call the destructors of what was broken off
+        os._exit(0)
     except InvalidInput as error:
         last = Refused(str(error), error.cause)
     except (RockbenchError, OSError) as error:
@@ -122,6 +125,7 @@ def _abort_on_terminate(requests: Requests) -> None:
         if requests.strongest is None:
             requests.abort("the session process received a request to terminate")
         if requests.breaking is not None:
+            keep_broken_off(frame)
             raise requests.breaking()
 
     signal.signal(signal.SIGTERM, handle)
