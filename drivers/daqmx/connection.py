@@ -1,7 +1,7 @@
 """Connection to the driver: on this PC, or on a controller behind a gRPC device server.
 
-Connections to a server are encrypted as it offers: TLS, and mutual TLS with a client certificate (wiki of NI's
-grpc-device, "Server Security Support"). The server supports no other credentials.
+Connections to a server can be encrypted with TLS, or with mutual TLS if a client certificate is configured. NI's server
+supports no other credentials (wiki of grpc-device, "Server Security Support").
 """
 
 import socket

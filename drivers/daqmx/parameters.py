@@ -8,7 +8,7 @@ from sim.errors import InvalidInput
 from sim.parameters import Parameters, quantity
 
 AUTOMATIC = "automatic"
-"""Value of a terminal that the program chooses."""
+"""Value of `laser_marker` with which the program chooses the counter."""
 Wiring = Literal["default", "differential", "pseudodifferential", "RSE", "NRSE"]
 
 
@@ -22,7 +22,7 @@ class AnalogInput(Parameters):
     @field_validator("terminal")
     @classmethod
     def _without_slash(cls, terminal: str) -> str:
-        # NI MAX shows terminals with a leading slash, the names of a device's channels have none
+        # NI MAX shows terminals with a leading slash; the names of a device's channels have none
         return terminal.strip("/")
 
 
@@ -33,12 +33,12 @@ class SafetyInput(Parameters):
     good: Literal["high", "low"] = quantity(
         "high",
         "",
-        "level in the good state: choose the level that a broken wire cannot produce, high on pulled-down inputs",
+        "level of the line in the good state: the level that a broken wire cannot produce, high on pulled-down inputs",
     )
 
 
 class EmergencyStop(SafetyInput):
-    """Second contact of the emergency stop."""
+    """Second contact of the emergency stop, read by the program; the first contact opens the enable chain."""
 
 
 class OverTravel(SafetyInput):
@@ -60,8 +60,8 @@ class AmplifierReady(SafetyInput):
     delay: float | None = quantity(
         None,
         "s",
-        "longest time from closing the enable line to ready, for an amplifier that is ready only while "
-        "enabled; if absent, it is ready beforehand",
+        "longest time from closing the enable line to the ready signal, for an amplifier that is ready only while "
+        "enabled; absent for an amplifier that is ready before it is enabled",
         gt=0,
         le=10,
         usual=(0.02, 5.0),
@@ -77,7 +77,7 @@ class Heartbeat(Parameters):
 
 
 class Tls(Parameters):
-    """Encrypted connection to the gRPC device server, which has certificates in its server_config.json."""
+    """Encrypted connection to the gRPC device server, whose server_config.json names the server's certificates."""
 
     root_certificate: str = quantity(
         "server_self_signed_crt.pem",
@@ -125,7 +125,7 @@ class Daq(Parameters):
     output: str = quantity("Dev1/ao0", "", "physical channel of the drive output")
     output_range: float = quantity(10.0, "V", "largest magnitude of the drive output", gt=0, le=10, usual=(1.0, 10.0))
     enable_line: str | None = quantity(
-        "Dev1/port0/line0", "", "digital line of the amplifier's enable relay; if absent, there is none"
+        "Dev1/port0/line0", "", "digital line of the amplifier's enable relay; absent if there is no relay"
     )
     start_trigger: str | None = quantity(
         None,
@@ -152,9 +152,9 @@ class Daq(Parameters):
     laser_marker: str | None = quantity(
         None,
         "",
-        "counter output that switches both serial lasers off for 40 short pulses at the beginning of each run, which "
-        "aligns their clocks; automatic: the first counter of the output's device, if the lasers follow it; if absent, "
-        "they are aligned from the arrival times of their values",
+        "counter output whose 40 short pulses at the beginning of each run switch both serial lasers off, which aligns "
+        "their clocks; automatic: the first counter of the output's device, if the lasers respond to its pulses; if "
+        "absent, the clocks are aligned from the arrival times of the values",
         example="Dev1/ctr0",
     )
     emergency_stop: EmergencyStop | None = quantity(None, "", "emergency stop; absent if not wired")
@@ -178,7 +178,7 @@ class Daq(Parameters):
 
     @property
     def missing_inputs(self) -> tuple[str, ...]:
-        """The names of the safety inputs that are not wired; a single over-travel line may cover both ends."""
+        """The names of the safety inputs that are not wired, except over-travel 2, which over-travel may include."""
         given = self.safety_inputs
         return tuple(name for name in self._possible_inputs if name not in given and name != "over-travel 2")
 

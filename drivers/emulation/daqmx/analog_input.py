@@ -91,7 +91,7 @@ class AnalogInput:
 
     @property
     def highest_rate(self) -> float:
-        """Highest sample rate per channel of the slowest device."""
+        """Highest sample rate per channel of the slowest device [1/s]."""
         rates: list[float] = []
         for name in self.devices:
             mine = [channel.inputs for channel in self.inputs if channel.device.name == name]
@@ -221,7 +221,7 @@ class AnalogInput:
         return seen
 
     def _at(self, first: int, n: int) -> Counts:
-        """Counts at the inputs at `n` consecutive ticks."""
+        """The plant's counts at `n` consecutive ticks from `first` on, shape (n, channels)."""
         columns = [channel.terminal for channel in self.inputs]
         try:
             rows = self._plant.inputs(first, n)

@@ -20,9 +20,10 @@ _PATIENCE = 10.0
 
 
 class Generation:
-    """Samples of all channels of an output task, by number.
+    """Samples of all channels of an output task in one run, by index.
 
-    Before the start, `buffer` samples fit; while running, the device's `memory` samples in addition.
+    The capacity is `buffer` samples before the start, and `buffer + memory` samples while running, where `memory` is
+    the part of the device's memory in use.
     """
 
     def __init__(self, channels: int, clock: SampleClock, buffer: int, memory: int) -> None:
