@@ -33,8 +33,8 @@ def _conversion_rate(job: Sampled, device: str) -> float:
 
 
 class TimingService(Service):
-    """CfgSampClkTiming, CfgImplicitTiming, CfgDigEdgeStartTrig, DisableStartTrig; attributes of timing, triggers and
-    buffers.
+    """Calls CfgSampClkTiming, CfgImplicitTiming, CfgDigEdgeStartTrig and DisableStartTrig, and those for attributes of
+    timing, triggers and buffers.
     """
 
     def CfgSampClkTiming(self, request: pb.CfgSampClkTimingRequest, context: object) -> pb.CfgSampClkTimingResponse:
