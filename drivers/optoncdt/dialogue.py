@@ -87,7 +87,7 @@ class CommandRefused(RigError):
 
     def __init__(self, who: str, command: str, answer: str) -> None:
         if answer.startswith("E202"):
-            remedy = "switch it to the professional user level in its web interface"
+            remedy = "select the professional user level in the sensor's web interface"
         else:
             remedy = "check the command in the manual of the sensor's firmware"
         super().__init__(f"{who} refused {command}: {answer}; {remedy}")

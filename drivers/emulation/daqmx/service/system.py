@@ -88,7 +88,9 @@ _CHASSIS: Mapping[int, ProductCategory] = {
 
 
 class SystemService(Service):
-    """Calls GetSystemInfoAttribute..., GetDeviceAttribute..., GetPhysicalChanAttribute..., ResetDevice, GetErrorString."""
+    """Calls GetSystemInfoAttribute..., GetDeviceAttribute..., GetPhysicalChanAttribute..., ResetDevice and
+    GetErrorString.
+    """
 
     def GetSystemInfoAttributeUInt32(
         self, request: pb.GetSystemInfoAttributeUInt32Request, context: object
