@@ -102,6 +102,8 @@ def _counts_fault(channel: Channel) -> str:
         return f"the faults of {channel.name} are {faults!a}: they must map counts to printable texts"
     with np.errstate(all="ignore"):
         limits = channel.limits
-    if all(map(isfinite, limits)):
-        return ""
-    return f"the values of {channel.name} range from {limits[0]} to {limits[1]}: both must be finite"
+    return (
+        ""
+        if all(map(isfinite, limits))
+        else f"the values of {channel.name} range from {limits[0]} to {limits[1]}: both must be finite"
+    )
