@@ -21,7 +21,7 @@ from bench.provenance import software
 from bench.unfinished import replace
 
 SWITCH = "ROCKBENCH_RESULT_CACHE"
-"""Environment variable; the value "off" disables the cache."""
+"""Environment variable that disables the cache if its value is "off"."""
 
 FOLDER = "results"
 MOST = 4000

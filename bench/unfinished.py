@@ -44,8 +44,8 @@ def keep_broken_off(frame: FrameType | None) -> None:
 
 @contextmanager
 def unfinished(path: Path) -> Generator[Path]:
-    """Context manager for the creation of a file or folder at `path`: removes it at exit unless it has been renamed or
-    marked as `whole`.
+    """Context manager for the creation of a file or folder at `path`: removes it at exit unless it has been renamed, or
+    marked as complete by `whole`.
     """
     _names.pop(path, None)
     _paths.add(path)
@@ -69,7 +69,7 @@ def temporary_folder() -> Generator[Path]:
 def replace(source: Path, target: Path) -> None:
     """Rename a complete file to its final name, replacing any existing file.
 
-    On Windows a scanner or an indexer may briefly hold either file, so the renaming is retried for `HELD` seconds.
+    On Windows a scanner or an indexer may briefly hold either file, so the rename is retried for `HELD` seconds.
     Raises OSError.
     """
     end = time.monotonic() + HELD
@@ -149,7 +149,7 @@ def _is_renamed(temporary: Path, path: Path) -> bool:
 
 
 def _discard(path: Path) -> None:
-    """Remove an unfinished result; a complete one has another name, or is marked as `whole`."""
+    """Remove an unfinished result; a complete one has another name, or has been marked by `whole`."""
     if _names.get(path) == path or not path.exists():
         return
     # otherwise `completed` would take an older file with the final name for the result

@@ -92,7 +92,7 @@ class CheckedRig:
         self._require_clock()
 
     def _given(self, name: str) -> Any:
-        """Unvalidated property of the backend's rig."""
+        """Property `name` of the backend's rig, not yet validated."""
         with self._calls(name.replace("_", " ")):
             return getattr(self._rig, name)
 

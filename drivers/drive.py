@@ -61,7 +61,7 @@ class Drive:
 
     def advance(self, n: int, gap: int = 0) -> int:
         """Count `n` queued samples as played and read, and return the index of the first one. `gap` is the number of
-        indices to skip before it, which a recording lacks.
+        samples before it that are missing from a recording.
         """
         first = self.index + gap
         self._waiting -= n
@@ -108,8 +108,8 @@ class RigState(Enum):
 class RigBase:
     """State, drive and clock of a rig: methods of `drivers.rig.Rig` common to all backends.
 
-    `lead` is the number of drive samples that must be queued beyond the block being read. As a context manager it
-    closes the rig.
+    `lead` is the number of drive samples that must be queued beyond the block being read. As a context manager, it
+    closes the rig on exit.
     """
 
     def __init__(self, drive_range: float, lead: int, clock: Clock) -> None:

@@ -107,7 +107,7 @@ def closed(rig: Rig) -> None:
 
 
 BEFORE_CLOSE = [fresh, armed, loaded, playing, stopped, halted, starved]
-"""All states of an open rig: for each, the function that brings a rig into it."""
+"""Functions that bring a rig into each of its states before `close()`."""
 AT_REST = [fresh, stopped, halted, starved]
 UNDER_WAY = [armed, loaded, playing]
 QUANTITIES = ("displacement", "acceleration", "force", "current", "voltage")
@@ -122,12 +122,12 @@ def refuses_to_play_and_to_read(rig: Rig) -> None:
 
 
 class RigConformance:
-    """Conformance tests. Derive from this class and provide a `make_rig` fixture, see the module's docstring."""
+    """Conformance tests. Derive from this class and provide a `make_rig` fixture (see the module's docstring)."""
 
     drive = 0.4
     """Height of the step of the drive in the test of the response [V]; the other tests output at most 0.1 V."""
     reacts = "table_acceleration"
-    """Name of the channel whose response to the drive is the fastest."""
+    """Name of the channel that responds to the drive first."""
     reaction_time = 0.1
     """Time within which the channel `reacts` must respond to a step of the drive [s]."""
 

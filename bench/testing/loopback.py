@@ -71,8 +71,8 @@ class LoopbackRig(ComputedRig):
 class LoopbackBench:
     """Guard and engine on a rig, by default a loop-back rig, without a human operator.
 
-    `events` contains every event, `outcomes` those of the steps of `run_steps`. Guard and engine use `checked`, the rig
-    with the checks of `drivers.border`, as in a session.
+    `events` contains every event, `outcomes` the outcomes of the steps that `run_steps` has run. Guard and engine use
+    `checked`, the rig with the checks of `drivers.border`, as in a session.
     """
 
     def __init__(

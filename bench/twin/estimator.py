@@ -62,7 +62,7 @@ class Resampler:
     """Linear-phase low-pass filter for signals in blocks; the output does not depend on the division into blocks.
 
     Delays every signal by `latency` [s], and signal i by a further `delays[i]` [s] (0 or more) with interpolation
-    between samples. Outputs a sample every `dt` [s]. The input before the first block is zero.
+    between samples. Outputs a sample every `dt` [s]. The input before the first block is taken as zero.
     """
 
     def __init__(self, sample_rate: float, delays: Sequence[float]) -> None:
@@ -72,7 +72,7 @@ class Resampler:
         self.latency = half / sample_rate
         late = np.array(delays) * sample_rate
         length = 2 * half + 1 + ceil(float(late.max()))
-        # the weight of the newest sample is last, as in the window of samples
+        # the weights are in the order of the samples, that of the newest sample last
         places = (np.arange(length)[::-1] - half - late[:, None]) / self.every
         window = np.i0(_KAISER * np.sqrt(np.maximum(1.0 - (places / _HALF_WIDTH) ** 2, 0.0)))
         taps = np.sinc(2.0 * _CUTOFF * places) * np.where(np.abs(places) <= _HALF_WIDTH, window, 0.0)
@@ -265,7 +265,7 @@ class Estimator:
         )
 
     def _trace(self, seconds: float, u: Array, theta: Array, low: Array, high: Array) -> Array:
-        """Trace with the columns `bench.live_values.TWIN_TRACE`."""
+        """Rows of the trace, one every `_TRACE` [s], with the columns of `bench.live_values.TWIN_TRACE`."""
         n = low.size
         rows = np.arange(self._skip, n, self._every)
         self._skip = (self._skip - n) % self._every

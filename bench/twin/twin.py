@@ -75,9 +75,9 @@ class Applicability:
 Array = NDArray[np.float64]
 
 _LATE = 0.15
-"""Backlog [s], of at least two blocks, at which the model drops members."""
+"""Backlog [s], but not less than two blocks, at which the model drops members."""
 _BEHIND = 1.0
-"""Backlog [s], of at least five blocks, at which the twin is switched off."""
+"""Backlog [s], but not less than five blocks, at which the twin is switched off."""
 _NOT_IN_TIME = "the twin did not keep up and is off until the rig is armed again"
 
 

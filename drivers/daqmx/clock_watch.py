@@ -27,7 +27,7 @@ _IDLE = 0.02
 _MOST = 10_000
 
 Reading = tuple[float, int, float]
-"""Number of samples acquired, between the times of the machine's clock before and after the reading [s]."""
+"""Reading: machine's clock before the call [s], number of samples acquired, machine's clock after the call [s]."""
 
 
 class ClockWatch:

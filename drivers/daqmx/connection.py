@@ -34,7 +34,7 @@ def require_private(server: str) -> None:
     except (OSError, UnicodeError):
         return
     for *_, place in found:
-        # a zone may follow an IPv6 address
+        # an IPv6 address may end with a zone
         if ip_address(str(place[0]).partition("%")[0]).is_global:
             raise InvalidInput("hardware.daq.server", server, _REMEDY)
 

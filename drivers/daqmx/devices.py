@@ -15,7 +15,7 @@ from drivers.daqmx.parameters import AnalogInput, Daq, Tls, device_name
 from sim.errors import InvalidInput
 
 _PATIENCE = 5.0
-"""Time allowed for a call to a server [s], whose driver may have to load first."""
+"""Time allowed for a call to a server [s]; the driver there may have to be loaded first."""
 
 T = TypeVar("T")
 

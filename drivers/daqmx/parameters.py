@@ -88,7 +88,7 @@ class Tls(Parameters):
     client_certificate: str | None = quantity(
         None,
         "",
-        "PEM file of the client's certificate, relative to this file, for a server that requires one; absent: none",
+        "PEM file of the client's certificate, relative to this file; absent if the server requires none",
         example="client_self_signed_crt.pem",
     )
     client_key: str | None = quantity(
@@ -157,18 +157,18 @@ class Daq(Parameters):
         "absent, the clocks are aligned from the arrival times of the values",
         example="Dev1/ctr0",
     )
-    emergency_stop: EmergencyStop | None = quantity(None, "", "emergency stop; absent if not wired")
-    over_travel: OverTravel | None = quantity(None, "", "over-travel switches; absent if not wired")
+    emergency_stop: EmergencyStop | None = quantity(None, "", "contact of the emergency stop; absent if not wired")
+    over_travel: OverTravel | None = quantity(None, "", "contact of the over-travel switches; absent if not wired")
     over_travel_2: OverTravel2 | None = quantity(
-        None, "", "over-travel switch at the other end; absent if over_travel covers both ends, or if not wired"
+        None, "", "contact of the over-travel switch at the other end; absent if over_travel covers both ends"
     )
-    amplifier_ready: AmplifierReady | None = quantity(None, "", "amplifier ready; absent if not wired")
+    amplifier_ready: AmplifierReady | None = quantity(None, "", "ready contact of the amplifier; absent if not wired")
     heartbeat: Heartbeat | None = quantity(None, "", "heartbeat; absent if there is no heartbeat relay")
     buffer: float = quantity(
         10.0, "s", "capacity of the input buffer as a duration: the longest possible delay of a read", ge=1.0, le=60.0
     )
     timeout_margin: float = quantity(
-        2.0, "s", "time allowed for a call to the driver beyond its own duration", ge=0.1, le=60, formerly="patience"
+        2.0, "s", "time allowed for a call to the driver beyond its usual duration", ge=0.1, le=60, formerly="patience"
     )
 
     @property

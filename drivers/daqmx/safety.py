@@ -218,7 +218,7 @@ class Heartbeat:
             raise
 
     def beat(self) -> None:
-        """Toggle the line; the first beat after a rest is a rising edge."""
+        """Toggle the line; the first edge after `rest()` is a rising one."""
         with translated("toggling the heartbeat line"):
             self._writer.write_one_sample_one_line(not self._high, _TIME)
         self._high = not self._high

@@ -107,7 +107,7 @@ class ControlServer:
 
 
 def _requests(lines: BinaryIO) -> Iterator[bytes]:
-    """Received lines; a longer line than `_LONGEST` is truncated to `_LONGEST + 1` bytes, so that it is refused."""
+    """Received lines; a line longer than `_LONGEST` is truncated to `_LONGEST + 1` bytes, so that it is refused."""
     while line := lines.readline(_LONGEST + 1):
         part = line
         while part and not part.endswith(b"\n"):

@@ -105,8 +105,8 @@ class Laboratory:
         self.daq.start()
 
     def late(self) -> dict[str, float]:
-        """Longest delay [s] since the last call, by laser, with which this computer has sent values; only delays
-        greater than `LATE`.
+        """Longest delay [s] with which this computer has sent values since the last call, by laser; only delays greater
+        than `LATE`.
         """
         found = {f"laser {storey}": laser.take_lateness() for storey, laser in enumerate(self.lasers, 1)}
         return {name: delay for name, delay in found.items() if delay > LATE}

@@ -88,7 +88,7 @@ class AnalogOutput:
 
     @property
     def highest_rate(self) -> float:
-        """Highest sample rate per channel of the slowest device [1/s]."""
+        """Highest sample rate per channel that all devices of the task support [1/s]."""
         return min(channel.highest_rate for channel in self.outputs)
 
     @property

@@ -56,7 +56,7 @@ class Generation:
         return capacity - (self.written - self.played(tick))
 
     def tick_of_space(self, samples: int) -> int | None:
-        """Tick at which `samples` further samples, or as many as the capacity, will fit; None while not running."""
+        """Tick at which there will be space for `samples` samples (at most the capacity); None while not running."""
         if self._first is None:
             return None
         capacity = self._buffer + self._memory

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from drivers.emulation.daqmx.errors import DaqmxFailure
 
 _SOON = 5.0e-5
-"""Shortest wait [s], for a clock reading that precedes the expected tick because of rounding."""
+"""Shortest wait [s], needed if a clock reading precedes the expected tick because of rounding."""
 
 
 def deadline_after(timeout: float) -> float:

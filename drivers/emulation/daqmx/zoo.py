@@ -158,7 +158,7 @@ SINGLE: dict[str, DeviceModel] = {
 NAMES = (*CHASSIS, *SINGLE)
 """The devices that can be emulated, by name."""
 SUGGESTED = ("9205", "9263", "9401", "9485")
-"""Modules in a chassis by default: inputs, output, digital inputs, relays."""
+"""Modules in a chassis by default: analogue inputs, analogue outputs, digital lines, relays."""
 
 
 def build(device: str, modules: Sequence[str] = ()) -> tuple[DeviceModel, ...]:

@@ -25,8 +25,8 @@ input speed.
 _MOST = 4096
 """Maximum number of bytes per read."""
 _CAPACITY = 640 * 1024
-"""Bytes that Linux keeps for a serial port whose reader is late (TTYB_DEFAULT_MEM_LIMIT); for a pseudo-terminal, only
-16 KiB, a third of a second of 4000 measurements/s with counter and time stamp.
+"""Bytes that Linux keeps for a serial port whose reader is late (TTYB_DEFAULT_MEM_LIMIT). For a pseudo-terminal it
+keeps only 16 KiB, which 4000 measurements/s with counter and time stamp fill in a third of a second.
 """
 
 

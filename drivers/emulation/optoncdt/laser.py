@@ -40,7 +40,7 @@ class Line:
         """Whether an answer may split a value."""
 
     def carried(self, stream: Bytes, answer: bytes, now: float) -> Bytes:
-        """Bytes that reach the client in spite of the faults: the values of `stream`, with `answer` between two of
+        """Bytes that reach the client under the present faults: the values of `stream`, with `answer` between two of
         them.
         """
         sent = self._with_answer(stream, answer)
@@ -237,7 +237,7 @@ class EmulatedLaser:
             time.sleep(_TURN)
 
     def _note_lateness(self, now: float) -> None:
-        """Update the lateness from the times since the line was last served and since no bytes were pending."""
+        """Update the longest delay from the time between two services of the line and the age of pending bytes."""
         if self._terminal.pending == 0:
             self._delivered = now
         self._lateness = max(self._lateness, now - self._served - _TURN, now - self._delivered)

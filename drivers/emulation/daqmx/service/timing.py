@@ -25,7 +25,7 @@ def _sampled(task: Task) -> Sampled:
 
 
 def _conversion_rate(job: Sampled, device: str) -> float:
-    """Conversions of a multiplexed device per second. Raises DaqmxFailure for devices without a multiplexer."""
+    """Conversion rate of a multiplexed device [1/s]. Raises DaqmxFailure for devices without a multiplexer."""
     period = job.conversion(device) if isinstance(job, AnalogInput) else None
     if period is None:
         raise unsupported(pb.TIMING_ATTRIBUTE_AI_CONV_RATE)
