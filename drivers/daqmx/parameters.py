@@ -160,7 +160,9 @@ class Daq(Parameters):
     emergency_stop: EmergencyStop | None = quantity(None, "", "contact of the emergency stop; absent if not wired")
     over_travel: OverTravel | None = quantity(None, "", "contact of the over-travel switches; absent if not wired")
     over_travel_2: OverTravel2 | None = quantity(
-        None, "", "contact of the over-travel switch at the other end; absent if over_travel covers both ends"
+        None,
+        "",
+        "contact of the over-travel switch at the other end; absent if over_travel covers both ends, or if not wired",
     )
     amplifier_ready: AmplifierReady | None = quantity(None, "", "ready contact of the amplifier; absent if not wired")
     heartbeat: Heartbeat | None = quantity(None, "", "heartbeat; absent if there is no heartbeat relay")
