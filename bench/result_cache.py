@@ -1,9 +1,9 @@
-"""Cache of results computed from the model, for later runs with the same inputs.
+"""Cache of results computed from the model, reused by later runs with the same inputs.
 
-The name of an entry is a hash of its inputs, of all source files of this program, and of the libraries and processor
-that affect the last digits. Entries are stored as JSON, which preserves all digits and executes no code, in the folder
-of the compiled kernel, which only this user can write. An unreadable entry is computed again; a failure to write one is
-ignored.
+The name of an entry contains a hash of its inputs, of all source files of this program, and of the versions of the
+libraries and the processor type, which affect the last digits. Entries are JSON files, which preserve all digits and
+cannot execute code, in a subfolder of the compiled kernel's folder, to which only this user can write. A result whose
+entry cannot be read is computed again; a failure to write an entry is ignored.
 """
 
 import json
@@ -21,17 +21,20 @@ from bench.provenance import software
 from bench.unfinished import replace
 
 SWITCH = "ROCKBENCH_RESULT_CACHE"
-"""Environment variable; the value "off" disables the cache."""
+"""Environment variable that disables the cache if its value is "off"."""
 
 FOLDER = "results"
 MOST = 4000
-"""Maximum number of entries; beyond it, the least recently used ones are removed until half of this number is left."""
+"""Maximum number of entries; if it is exceeded, the least recently used ones are removed until half as many remain."""
 
 PACKAGES = ("bench", "drivers", "protocols", "sim")
 
 
 def cached(kind: str, inputs: object, compute: Callable[[], Any]) -> Any:
-    """Result of `compute` for `inputs`, both JSON content, from the cache if possible; `kind` names the computation."""
+    """Return the result of `compute()`, from the cache if the cache has an entry for `inputs`.
+
+    Both `inputs` and the result must be JSON-serialisable. `kind` names the computation.
+    """
     folder = _folder()
     if folder is None:
         return compute()
@@ -39,7 +42,7 @@ def cached(kind: str, inputs: object, compute: Callable[[], Any]) -> Any:
     path = folder / f"{kind}-{sha256(text.encode()).hexdigest()}.json"
     with suppress(OSError, ValueError, KeyError, TypeError):
         stored = json.loads(path.read_text(encoding="utf-8"))
-        # compare the inputs, not only their hash; a truncated file has no result
+        # compare the inputs as well, because different inputs might have the same hash
         if stored["inputs"] == text:
             os.utime(path)
             return stored["result"]
@@ -84,7 +87,7 @@ def _prune(folder: Path) -> None:
 
 @lru_cache(maxsize=1)
 def stamp() -> list[object]:
-    """All versions and hashes, apart from the inputs, on which a result depends."""
+    """Hash of the source files, versions and processor on which a result depends in addition to its inputs."""
     from sim.kernel.compiled import processor
 
     root, digest = Path(__file__).parents[1], sha256()

@@ -1,4 +1,4 @@
-"""Opening of the configured rig, and the backends of this program."""
+"""The rig backends of this program, and a function that opens the configured rig."""
 
 from bench.config.backend import CommonSettings, RigBackend, load_backend
 from bench.config.model import BenchConfiguration
@@ -12,7 +12,7 @@ from sim.errors import RockbenchError
 from sim.extras import require
 
 _PURPOSES = {"serial": "a laser on a serial port"}
-"""Purpose of each extra that only some benches require, as stated in the error message."""
+"""Purpose of each optional dependency (extra) that not every bench requires, as named in the error message."""
 
 
 def require_drivers(configuration: BenchConfiguration) -> None:
@@ -25,7 +25,7 @@ def open_rig(configuration: BenchConfiguration, *, realtime: bool) -> Rig:
     """Open the rig of the configured backend, unarmed and wrapped in the checks of `drivers.border`. The caller closes
     it.
 
-    Raises BackendFault if the backend fails with an error other than this program's, or returns no valid rig.
+    Raises BackendFault if the backend raises an error that is not a RockbenchError, or returns an invalid rig.
     """
     backend = load_backend(configuration.backend)
     try:

@@ -44,8 +44,8 @@ def keep_broken_off(frame: FrameType | None) -> None:
 
 @contextmanager
 def unfinished(path: Path) -> Generator[Path]:
-    """Context manager for the creation of a file or folder at `path`: removes it at exit unless it has been renamed or
-    marked as `whole`.
+    """Context manager for the creation of a file or folder at `path`: removes it at exit unless it has been renamed, or
+    marked as complete by `whole`.
     """
     _names.pop(path, None)
     _paths.add(path)
@@ -69,7 +69,7 @@ def temporary_folder() -> Generator[Path]:
 def replace(source: Path, target: Path) -> None:
     """Rename a complete file to its final name, replacing any existing file.
 
-    On Windows a scanner or an indexer may briefly hold either file, so the renaming is retried for `HELD` seconds.
+    On Windows a scanner or an indexer may briefly hold either file, so the rename is retried for `HELD` seconds.
     Raises OSError.
     """
     end = time.monotonic() + HELD
@@ -86,14 +86,14 @@ def replace(source: Path, target: Path) -> None:
 
 def finish(temporary: Path, target: Path) -> None:
     """Rename the complete result `temporary` to its final name. Raises OSError."""
-    # listed before the rename: an interrupt may come between any two instructions, and `completed` then checks the
-    # files
+    # listed before the rename, because an interrupt may come between any two instructions; `completed` checks whether
+    # the file has been renamed
     _names[temporary] = target
     replace(temporary, target)
 
 
 def completed() -> list[Path]:
-    """Results that have been completed since `forget_completed`: they are kept even after an interrupt."""
+    """Paths of the results completed since the last `forget_completed()`. They are kept even after an interrupt."""
     return [path for temporary, path in tuple(_names.items()) if path == temporary or _is_renamed(temporary, path)]
 
 
@@ -127,8 +127,8 @@ def whole(path: Path) -> None:
 
 
 def reserve(folder: Path) -> None:
-    """Register `folder`, which was created for results: if the process ends without running `finally`, the folder is
-    removed unless it contains files.
+    """Register `folder`, which was created for results: if the process ends without running `finally`, the folder and
+    its parent folder are removed if they are empty.
     """
     _reserved.add(folder)
 
@@ -149,10 +149,10 @@ def _is_renamed(temporary: Path, path: Path) -> bool:
 
 
 def _discard(path: Path) -> None:
-    """Remove an unfinished result; a complete one has another name, or is marked as `whole`."""
+    """Remove an unfinished result; a complete one has another name, or has been marked by `whole`."""
     if _names.get(path) == path or not path.exists():
         return
-    # an older file with the final name is not the result
+    # otherwise `completed` would take an older file with the final name for the result
     _names.pop(path, None)
     with suppress(OSError):
         _remove(path)

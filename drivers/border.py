@@ -1,7 +1,7 @@
 """Validation of everything that a rig backend returns to the bench.
 
-A backend may belong to another package. An invalid rig, channel, block or Boolean, or an exception that a rig must not
-raise, causes a BackendFault, which names the backend.
+A backend may belong to another package. An invalid rig, channel or block, or an exception that a rig must not raise,
+causes a BackendFault, which names the backend. An invalid state of a safety input counts as open.
 """
 
 from collections.abc import Mapping
@@ -19,17 +19,19 @@ from sim.errors import RockbenchError
 
 MOST_CHANNELS = 256
 LOWEST_RATE = 1.0
-"""Smallest sample rate [1/s]; at a tiny one, a replay would never end."""
+"""Smallest sample rate [1/s]; at a far lower one, a replay would take forever."""
 HIGHEST_RATE = 1e6
 """Largest sample rate [1/s]; above it, this program's buffers would hold less than a second."""
 LONGEST_LEAD = 10.0
-"""Longest lead [s]: the time after which a drive sample written by the guard takes effect."""
+"""Longest lead [s], the delay from writing a drive sample to its output."""
 HIGHEST_VOLTAGE = 100.0
 """Largest drive range [V]."""
 
 
 class CheckedClock:
-    """Clock of a backend. After an invalid reading it returns the last valid one; `fault` describes the reading."""
+    """Clock of a backend, with its readings validated. In place of an invalid reading, `now` returns the last valid
+    one, and `fault` describes the invalid one.
+    """
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
@@ -53,7 +55,7 @@ class CheckedClock:
 
 
 class _CheckedVirtualClock(CheckedClock, VirtualClock):
-    """Virtual clock of a backend."""
+    """Virtual clock of a backend, with its readings validated."""
 
 
 class CheckedRig:
@@ -90,7 +92,7 @@ class CheckedRig:
         self._require_clock()
 
     def _given(self, name: str) -> Any:
-        """Unvalidated property of the backend's rig."""
+        """Property `name` of the backend's rig, not yet validated."""
         with self._calls(name.replace("_", " ")):
             return getattr(self._rig, name)
 
@@ -100,7 +102,7 @@ class CheckedRig:
         given = self._given("alignments")
         names = [channel.name for channel in self.channels]
         if type(given) is not tuple or not all(is_alignment(each, names) for each in cast("tuple[Any, ...]", given)):
-            self._refuse(f"returned {given!a:.80} as alignments of its sensors")
+            self._refuse(f"returned alignments {given!a:.80}: they must be a tuple of valid Alignments of its channels")
         return cast("tuple[Alignment, ...]", given)
 
     def interlocks(self) -> Mapping[str, bool]:
@@ -126,7 +128,7 @@ class CheckedRig:
 
     def write(self, volts: NDArray[np.float64]) -> None:
         with self._calls("write"):
-            # the guard keeps its own array: a backend may convert its argument in place
+            # pass a copy, because a backend may modify its argument in place
             self._rig.write(np.array(volts, dtype=np.float64))
 
     def read(self, n: int) -> Block:
@@ -197,7 +199,7 @@ class CheckedRig:
             with self._calls("channels"):
                 wrong = wrong_with(channel) or ("its name is repeated" if channel.name in known else "")
             if wrong:
-                self._refuse(f"has an invalid channel, number {number}: {wrong}")
+                self._refuse(f"has an invalid channel at index {number}: {wrong}")
             known.add(channel.name)
         return channels
 
@@ -221,7 +223,7 @@ class CheckedRig:
         first: object = given.first
         counts: Any = given.counts
         if not is_count(first) or first < 0:
-            self._refuse(f"returned a block whose first sample is {first!a}")
+            self._refuse(f"returned a block whose first index is {first!a}: it must be an integer, 0 or more")
         if not isinstance(counts, np.ndarray):
             self._refuse(f"returned a block of {type(counts).__name__} instead of an array of counts")
         counts = cast("NDArray[Any]", counts)
@@ -244,12 +246,12 @@ class CheckedRig:
             return ()
         names = [channel.name for channel in self.channels]
         if type(given) is not tuple or not all(is_raw(each, names) for each in cast("tuple[Any, ...]", given)):
-            self._refuse(f"returned {given!a:.80} as raw values of its sensors")
+            self._refuse(f"returned raw values {given!a:.80}: they must be a tuple of valid RawValues of its channels")
         raw = cast("tuple[RawValues, ...]", given)
         return tuple(RawValues(each.sensor, *(np.array(getattr(each, name)) for name in RAW)) for each in raw)
 
     def _require_storable(self, counts: NDArray[Any]) -> None:
-        """Refuse counts outside the range of their channel's storage type, which the file would alter."""
+        """Refuse counts outside the range of their channel's storage type: storing them would alter them."""
         low, high = counts.min(axis=0), counts.max(axis=0)
         for column, channel in enumerate(self.channels):
             span = np.iinfo(channel.storage)
@@ -259,13 +261,13 @@ class CheckedRig:
 
 
 _NONE: tuple[()] = ()
-"""Result of `raw_values` of most rigs, for every block; compared by identity, since a backend may return any type."""
+"""Usual result of `raw_values`; recognised by identity, since a backend may return any type."""
 
 
 class _Calls:
     """Context manager that converts exceptions that a rig must not raise into BackendFault.
 
-    Implemented as a class: a generator would take several times as long, and every block uses it six times.
+    Implemented as a class, because every block enters six of these and a generator would take several times as long.
     """
 
     __slots__ = ("_backend", "_call")

@@ -71,19 +71,19 @@ def wrong_with(channel: Any) -> str:
     if not isinstance(channel, Channel):
         return f"{type(channel).__name__} is not a channel"
     if not (is_text(channel.name) and _NAME.fullmatch(channel.name)):
-        return f"its name is {channel.name!a}"
+        return f"its name {channel.name!a} is not an identifier"
     for item, text in (("unit", channel.unit), ("quantity", channel.quantity)):
         if not is_text(text, printable=True) or not text:
-            return f"the {item} of {channel.name} is {text!a}"
+            return f"the {item} of {channel.name} is {text!a}: it must be printable text"
     if not is_text(channel.device):
-        return f"the device of {channel.name} is {channel.device!a}"
+        return f"the device of {channel.name} is {channel.device!a}: it must be text"
     if not is_number(channel.scale) or channel.scale == 0.0:
-        return f"the scale of {channel.name} is {channel.scale!a}"
+        return f"the scale of {channel.name} is {channel.scale!a}: it must be a finite number other than 0"
     if not is_number(channel.offset):
-        return f"the offset of {channel.name} is {channel.offset!a}"
+        return f"the offset of {channel.name} is {channel.offset!a}: it must be a finite number"
     higher: Any = channel.higher
     if type(higher) is not tuple or not all(map(is_number, cast("tuple[Any, ...]", higher))):
-        return f"the higher terms of {channel.name} are {higher!a}"
+        return f"the higher terms of {channel.name} are {higher!a}: they must be a tuple of finite numbers"
     return _counts_fault(channel)
 
 
@@ -95,11 +95,15 @@ def _counts_fault(channel: Channel) -> str:
         or not all(map(is_count, cast("tuple[Any, ...]", valid)))
         or not span.min <= valid[0] < valid[1] <= span.max
     ):
-        return f"the valid counts of {channel.name} are {valid!a}"
+        return f"the valid counts of {channel.name} are {valid!a}: they must be two increasing 32-bit integers"
     if not isinstance(faults, Mapping) or not all(
         is_count(count) and is_text(text, printable=True) for count, text in cast("Mapping[Any, Any]", faults).items()
     ):
-        return f"the faults of {channel.name} are {faults!a}"
+        return f"the faults of {channel.name} are {faults!a}: they must map counts to printable texts"
     with np.errstate(all="ignore"):
         limits = channel.limits
-    return "" if all(map(isfinite, limits)) else f"the values of {channel.name} range from {limits[0]} to {limits[1]}"
+    return (
+        ""
+        if all(map(isfinite, limits))
+        else f"the values of {channel.name} range from {limits[0]} to {limits[1]}: both must be finite"
+    )

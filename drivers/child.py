@@ -1,7 +1,8 @@
 """Child processes that serve a run and must survive termination requests sent to the whole process group.
 
-While the output is driven, the program responds to such a request by ramping it to zero. If a child ended first, the
-program would lose an instrument and cut the output at once. These children end when their standard input is closed.
+While the output is driven, the program responds to such a request by ramping the output to zero. If a child ended
+first, the program would lose an instrument and cut the output at once. These children therefore end only when their
+standard input is closed.
 """
 
 import signal
@@ -12,7 +13,7 @@ from contextlib import suppress
 from sim import waiting
 
 OWN_CONSOLE = subprocess.CREATE_NO_WINDOW if sys.platform == "win32" else 0
-"""Creation flag of the child on Windows: a child without the program's console survives the closing of that console."""
+"""Process creation flag on Windows; a child that does not share the program's console survives its closing."""
 
 ENDING = 2.0
 """Longest wait for a child to end [s], after which it is killed."""

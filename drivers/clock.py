@@ -17,7 +17,7 @@ def now() -> float:
 
 
 class Clock(Protocol):
-    """Clock with an arbitrary origin, with a sleep that uses the same clock."""
+    """Clock with an arbitrary origin, and a wait that ends at a time of this clock."""
 
     def now(self) -> float:
         """Seconds since the clock's origin; never decreases."""
@@ -42,7 +42,7 @@ class VirtualClock:
 
 
 class WallClock:
-    """The machine's clock in real time."""
+    """Real time, from the machine's clock."""
 
     def now(self) -> float:
         return now()

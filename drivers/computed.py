@@ -35,12 +35,12 @@ class ComputedRig(RigBase, ABC):
 
     @abstractmethod
     def respond(self, volts: NDArray[np.float64]) -> Counts:
-        """Counts of all channels, shape (n, n_channels), in response to the next `volts`, shape (n,); sample i of the
-        drive takes effect after sample i of the inputs.
+        """Counts of all channels, shape (n, n_channels), in response to the next `volts`, shape (n,). Sample i of the
+        drive must not affect the inputs before sample i + 1.
         """
 
     def begin(self) -> None:
-        """Prepare a run, before its sample 0."""
+        """Prepare a run; called by `arm` before sample 0."""
 
     def carry_out(self, work: OperatorTask, amount: float | None) -> None:
         """Carry out an operator action on the stopped rig."""

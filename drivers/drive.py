@@ -55,13 +55,13 @@ class Drive:
         """Raise DriveUnderflow unless `n` samples and the lead are queued."""
         if self._waiting < n + self.lead:
             raise DriveUnderflow(
-                f"the drive ran out at sample {self.index}: {self._waiting} samples were queued and {n + self.lead}"
-                " are required; write earlier, or increase acquisition.lead"
+                f"the drive ran out at sample {self.index}: {self._waiting} of {n + self.lead} required samples were"
+                " queued; write earlier, or increase acquisition.lead"
             )
 
     def advance(self, n: int, gap: int = 0) -> int:
-        """Count `n` samples as played and read, after `gap` samples without drive. Returns the index of the first
-        one.
+        """Count `n` queued samples as played and read, and return the index of the first one. `gap` is the number of
+        samples before it that are missing from a recording.
         """
         first = self.index + gap
         self._waiting -= n
@@ -95,7 +95,9 @@ class _EndingBy(AbstractContextManager[None]):
 
 
 class RigState(Enum):
-    """States of a rig. A rig whose sample clock starts with the first block is armed until then, and running after."""
+    """States of a rig. A rig whose sample clock starts with the first block read is armed until then, and running
+    afterwards.
+    """
 
     STOPPED = "not armed"
     ARMED = "armed"
@@ -106,8 +108,8 @@ class RigState(Enum):
 class RigBase:
     """State, drive and clock of a rig: methods of `drivers.rig.Rig` common to all backends.
 
-    `lead` is the number of drive samples that must be queued beyond the block being read. As a context manager it
-    closes the rig.
+    `lead` is the number of drive samples that must be queued beyond the block being read. As a context manager, it
+    closes the rig on exit.
     """
 
     def __init__(self, drive_range: float, lead: int, clock: Clock) -> None:

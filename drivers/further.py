@@ -30,7 +30,7 @@ class FurtherChannel(CalibratedInput):
     unit: str = quantity(..., "", "SI unit of the quantity", min_length=1, example="m/s2")
     place: Place = quantity(..., "", "part of the bench on which the sensor is mounted", example="storey 2")
     sensitivity: float = quantity(
-        ..., "V/unit", "volts per unit as calibrated; its sign is the polarity", usual=(1e-6, 1e6), example=0.1
+        ..., "V/unit", "volts per unit as calibrated; the sign gives the polarity", usual=(1e-6, 1e6), example=0.1
     )
     zero: float = quantity(0.0, "V", "voltage when the quantity is zero", usual=(1e-3, 2.0))
     limit: float | None = quantity(
@@ -58,7 +58,7 @@ class FurtherChannel(CalibratedInput):
         reach = (self.range - abs(self.zero)) / abs(self.sensitivity)
         if self.limit is not None and self.limit > reach:
             scale = f"range = {self.range:g} V and sensitivity = {self.sensitivity:g}"
-            allowed = f"with {scale} the channel measures only up to {reach:.4g} {self.unit}"
+            allowed = f"with {scale} the channel measures only up to {reach:.4g} {self.unit}; reduce the limit"
             raise InvalidInput("limit", self.limit, allowed)
         return self
 
@@ -66,7 +66,7 @@ class FurtherChannel(CalibratedInput):
     def simulated(self) -> PlacedSensor:
         """The sensor's model on the simulated bench. Raises InvalidInput for an unsupported quantity or place."""
         if self.measures not in SIMULATED or self.place == "elsewhere":
-            allowed = f"on the simulated bench, it must be {', '.join(SIMULATED)} of the table or a storey"
+            allowed = f"the simulated bench provides, for the table and the storeys, only: {', '.join(SIMULATED)}"
             raise InvalidInput("measures", f"{self.measures} of {self.place}", allowed)
         return PlacedSensor(
             name=self.name,

@@ -7,9 +7,9 @@ The tests of a backend derive a class from `RigConformance` and provide a `make_
         def make_rig(self) -> Iterator[RigFactory]: ...
 
 Every call of the factory opens a new rig that is not armed; the fixture closes all of them. A server or an instrument
-behind the rig must run before the factory is returned and until the last rig is closed. The tests drive a rig with at
-most `drive` volts for a fraction of a second and open about twenty rigs in total, so that they can run on hardware and
-in real time. Numbers of samples follow from durations and the rig's sample rate.
+behind the rig must be running before the factory is returned, and until the last rig is closed. The tests drive a rig
+with at most `drive` volts (or 0.1 V, if that is larger) for a fraction of a second and open about twenty rigs in total,
+so that they can run on hardware and in real time. Numbers of samples follow from durations and the rig's sample rate.
 
 `pytest.register_assert_rewrite("bench.testing.conformance")` in a conftest.py shows the values of a failed assertion.
 """
@@ -41,7 +41,7 @@ def started(rig: AnyRig, ahead: int = 0) -> AnyRig:
 
 
 def play(rig: Rig, volts: NDArray[np.float64], block: int = 100) -> list[Block]:
-    """Write and read `volts`, shape (n,), block by block on a rig whose lead is filled."""
+    """Write `volts`, shape (n,), to a rig whose lead has been written, and read as many samples, block by block."""
     blocks: list[Block] = []
     for start in range(0, volts.size, block):
         part = volts[start : start + block]
@@ -61,7 +61,7 @@ def refusal(error: type[RigError] = RigError) -> Generator[None]:
 
 
 def fresh(rig: Rig) -> None:
-    """Leave the rig in its state after opening or stopping."""
+    """Leave the rig unarmed, as it was opened or stopped."""
     assert rig.sample_rate > 0.0
 
 
@@ -76,7 +76,7 @@ def loaded(rig: Rig) -> None:
 
 
 def playing(rig: Rig) -> None:
-    """Bring the rig to the middle of a non-zero drive."""
+    """Arm the rig, play 0.1 V for 0.1 s and leave it armed."""
     started(rig)
     play(rig, np.full(samples(rig, 0.1), 0.1), samples(rig, 0.05))
 
@@ -107,7 +107,7 @@ def closed(rig: Rig) -> None:
 
 
 BEFORE_CLOSE = [fresh, armed, loaded, playing, stopped, halted, starved]
-"""All states of an open rig: for each, the function that brings a rig into it."""
+"""Functions that bring a rig into each of its states before `close()`."""
 AT_REST = [fresh, stopped, halted, starved]
 UNDER_WAY = [armed, loaded, playing]
 QUANTITIES = ("displacement", "acceleration", "force", "current", "voltage")
@@ -122,12 +122,12 @@ def refuses_to_play_and_to_read(rig: Rig) -> None:
 
 
 class RigConformance:
-    """Conformance tests. Derive from this class and provide a `make_rig` fixture, see the module's docstring."""
+    """Conformance tests. Derive from this class and provide a `make_rig` fixture (see the module's docstring)."""
 
     drive = 0.4
-    """Largest voltage that the tests output [V]."""
+    """Height of the step of the drive in the test of the response [V]; the other tests output at most 0.1 V."""
     reacts = "table_acceleration"
-    """Name of the channel whose response to the drive is the fastest."""
+    """Name of the channel that responds to the drive first."""
     reaction_time = 0.1
     """Time within which the channel `reacts` must respond to a step of the drive [s]."""
 
@@ -168,7 +168,7 @@ class RigConformance:
         assert isinstance(rig.alignments, tuple)
         for alignment in rig.alignments:
             assert alignment.sensor in [channel.name for channel in rig.channels]
-            # two quartz clocks, each accurate to 50 ppm, are compared over only a fraction of a second
+            # quartz clocks agree to about 100 ppm, but a comparison over a fraction of a second is less accurate
             assert abs(alignment.rate - 1.0) <= 1e-3
             assert alignment.residual >= 0.0
             assert alignment.values > 0
@@ -206,7 +206,7 @@ class RigConformance:
     def test_close_is_allowed_in_every_state_any_number_of_times_and_leaves_nothing_behind(
         self, make_rig: RigFactory
     ) -> None:
-        # a first rig loads libraries, some of whose resources are never released; `before` must include these
+        # opening the first rig loads libraries that keep some resources; `before` must include these
         make_rig().close()
         before = held()
         for state in (armed, playing, halted, starved):

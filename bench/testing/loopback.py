@@ -18,14 +18,15 @@ from drivers.computed import ComputedRig
 from drivers.rig import Channel, Counts, OperatorTask, Rig
 
 COUNTS_PER_UNIT = 1000.0
-"""Resolution of every channel [counts per m or per m/s2]."""
+"""Resolution of every channel [counts per unit of its value]."""
 
 
 class LoopbackRig(ComputedRig):
-    """Rig in virtual time whose channels return `response[name](volts)`, in their units.
+    """Rig in virtual time; the value measured by channel `name` is `response[name](volts)`, in the channel's unit.
 
     NaN becomes -32768 counts, which means no measurement. `played` contains the drive samples of all runs, `done` the
-    operator actions, `safety` the states of the safety inputs; `halted` is True once the output has been cut.
+    operator actions carried out, `safety` the states of the safety inputs; `halted` is True once the output has been
+    cut.
     """
 
     def __init__(
@@ -68,9 +69,10 @@ class LoopbackRig(ComputedRig):
 
 
 class LoopbackBench:
-    """Guard and engine on a rig, by default a loop-back rig, without a human operator. Stores every event and outcome.
+    """Guard and engine on a rig, by default a loop-back rig, without a human operator.
 
-    Guard and engine use `checked`, which is the rig with the checks of `drivers.border`, as in a session.
+    `events` contains every event, `outcomes` the outcomes of the steps that `run_steps` has run. Guard and engine use
+    `checked`, the rig with the checks of `drivers.border`, as in a session.
     """
 
     def __init__(

@@ -9,9 +9,9 @@ _PATIENCE = 10.0
 
 
 def held() -> dict[str, int]:
-    """Number of threads and, on Linux, of open files (including ports and sockets) and child processes.
+    """Numbers of threads and, on Linux, of open files (including ports and sockets) and child processes.
 
-    Excludes threads of an emulated laboratory in this process, because it starts before a rig and outlives it.
+    Excludes the threads of an emulated laboratory in this process, because the laboratory outlives the rigs.
     """
     counts = {"threads": sum(not thread.name.startswith("emulated") for thread in threading.enumerate())}
     own = Path("/proc/self")
@@ -22,7 +22,7 @@ def held() -> dict[str, int]:
 
 
 def held_at_last(allowed: dict[str, int]) -> dict[str, int]:
-    """Wait until the resources held are within `allowed`, or until a time-out, and return them."""
+    """Return the numbers of resources as soon as none exceeds its `allowed` number, or after a time-out."""
     deadline = time.monotonic() + _PATIENCE
     now = held()
     while any(count > allowed[kind] for kind, count in now.items()) and time.monotonic() < deadline:

@@ -1,4 +1,4 @@
-"""Ensemble of specimens, drawn within the uncertainty of one specimen, under the same table motion; gain of each."""
+"""Ensemble of specimens drawn from the uncertainty of one: their motions and gains under the same table motion."""
 
 from collections import deque
 from collections.abc import Sequence
@@ -19,7 +19,9 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Members:
-    """Specimens, the nominal one first, and `scales`, the ratios of true to measured table motion, shape (n,)."""
+    """Members of an ensemble: n specimens, the nominal one first, and `scales`, the ratios of true to measured table
+    motion, shape (n,).
+    """
 
     specimens: Sequence[Specimen]
     scales: Array
@@ -34,8 +36,8 @@ class Members:
 
 
 def draw_members(specimen: Specimen, configuration: BenchConfiguration) -> Members:
-    """Draw members reproducibly from the uncertainties of `specimen` and of the accelerometer; the first is
-    `specimen`.
+    """Draw members reproducibly from the uncertainties of `specimen` and of the scale of the table's accelerometer; the
+    first member is `specimen`.
     """
     twin, random = configuration.twin, np.random.default_rng(configuration.twin.seed)
     others = configuration.known.draws(specimen, twin.members, random)
@@ -44,7 +46,7 @@ def draw_members(specimen: Specimen, configuration: BenchConfiguration) -> Membe
 
 
 class Ensemble:
-    """Motion of the members from rest, advanced with the acceleration of the table, every `dt` [s]."""
+    """Integrates the motions of the members, from rest, under table accelerations sampled every `dt` [s]."""
 
     def __init__(self, those: Members, dt: float) -> None:
         self._scales = those.scales
@@ -63,9 +65,10 @@ class Ensemble:
         del self._streams[n:]
 
     def feed(self, acceleration: Array) -> Array:
-        """Compute u1, u2 [m] and theta [rad], shape (3, n_specimens, n), for table accelerations [m/s2], shape (n,).
+        """Storey displacements u1, u2 [m] and block rotation theta [rad], shape (3, n_members, n), under the next table
+        accelerations [m/s2], shape (n,).
 
-        The values of a specimen are NaN after its block has fallen. Raises InvalidInput for accelerations that are not
+        The values of a member are NaN after its block has fallen. Raises InvalidInput for accelerations that are not
         finite.
         """
         motions = np.full((3, len(self._streams), acceleration.size), np.nan)
@@ -76,19 +79,21 @@ class Ensemble:
 
 
 _CYCLES = 5.0
-"""Number of cycles of a sine over which peak and amplitude are evaluated."""
+"""Number of cycles of a sine over which the peak drift and the amplitude of the table's acceleration are evaluated."""
 
 
 @dataclass(frozen=True)
 class Measured:
-    """Gain published by the protocol, under a sine of `omega` [rad/s] or under an earthquake record (`omega` None)."""
+    """Measured gain `alpha_2`, as published by the protocol, under a sine of `omega` [rad/s] or, if `omega` is None,
+    under an earthquake record.
+    """
 
     alpha_2: float
     omega: float | None
 
 
 class Gains:
-    """alpha_2 of every member during one run."""
+    """Gain alpha_2 of every member during one run: ratio of its peak drifts with and without block."""
 
     def __init__(self, those: Members, dt: float) -> None:
         self._those, self._dt = those, dt
@@ -97,13 +102,14 @@ class Gains:
         self._bare_peaks = np.zeros(len(those.specimens))
         self._bare: Ensemble | None = None
         self._bare_per_unit: tuple[float, Array] | None = None
-        # accelerations and peak drifts that are still required; all are kept until the kind of test is known
+        # the accelerations and peak drifts still required: all of them until the kind of test is known
         self._held: deque[tuple[Array, Array]] = deque()
 
     def push(self, acceleration: Array, drift: Array, measured: Measured | None) -> Array:
         """Add accelerations [m/s2], shape (n,), and drifts [m], shape (k, n), of the k remaining members.
 
-        Returns alpha_2 of the members, shape (k,); NaN after the block has fallen, and until a gain is `measured`.
+        Returns alpha_2 of the members, shape (k,). It is NaN for specimens without block, after a member's block has
+        fallen, while `measured` is None, and during the first cycles of a sine.
         """
         k = len(drift)
         if not self._coupled:

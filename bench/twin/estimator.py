@@ -1,4 +1,4 @@
-"""Twin of one run, without threads: computes estimates and residuals from blocks of samples."""
+"""Computation of the live twin in one run, without threads: estimates and residuals from blocks of samples."""
 
 from collections import deque
 from collections.abc import Sequence
@@ -26,10 +26,10 @@ _HELD = 0.5
 
 
 def laser_lag(configuration: BenchConfiguration) -> tuple[float, float]:
-    """Delay of the lasers relative to the accelerometer and to the displacement sensor [s].
+    """Delays of the lasers relative to the table's accelerometer and relative to its displacement sensor [s].
 
-    It is zero for serial lasers, which `hardware.lasers.delay` aligns to the sample clock, and is assumed zero for
-    backends of other packages.
+    `twin.laser_lag`, if configured, applies to both. Otherwise the delays are zero for serial lasers, whose values are
+    already aligned to the sample clock, and are assumed zero for backends of other packages.
     """
     if (told := configuration.twin.laser_lag) is not None:
         return told, told
@@ -53,8 +53,8 @@ far below it.
 _HALF_WIDTH = 6
 """Half the length of the filter's impulse response [samples of the model]."""
 _KAISER = 5.65
-"""Parameter beta of the Kaiser window (Kaiser, 1974) for a stop-band attenuation of 60 dB; with this length the
-transition band is 0.3 of the model's rate wide.
+"""Parameter beta of the Kaiser window (Kaiser, 1974) for a stop-band attenuation of 60 dB. With a length of twice
+`_HALF_WIDTH`, the width of the transition band is 0.3 times the model's rate.
 """
 
 
@@ -62,7 +62,7 @@ class Resampler:
     """Linear-phase low-pass filter for signals in blocks; the output does not depend on the division into blocks.
 
     Delays every signal by `latency` [s], and signal i by a further `delays[i]` [s] (0 or more) with interpolation
-    between samples. Outputs a sample every `dt` [s]. The input before the first block is zero.
+    between samples. Outputs a sample every `dt` [s]. The input before the first block is taken as zero.
     """
 
     def __init__(self, sample_rate: float, delays: Sequence[float]) -> None:
@@ -72,7 +72,7 @@ class Resampler:
         self.latency = half / sample_rate
         late = np.array(delays) * sample_rate
         length = 2 * half + 1 + ceil(float(late.max()))
-        # the weight of the newest sample is last, as in the window of samples
+        # the weights are in the order of the samples, that of the newest sample last
         places = (np.arange(length)[::-1] - half - late[:, None]) / self.every
         window = np.i0(_KAISER * np.sqrt(np.maximum(1.0 - (places / _HALF_WIDTH) ** 2, 0.0)))
         taps = np.sinc(2.0 * _CUTOFF * places) * np.where(np.abs(places) <= _HALF_WIDTH, window, 0.0)
@@ -94,14 +94,14 @@ class Resampler:
 
 
 SPAN = 1.0
-"""Window of a residual [s]."""
+"""Length of the window over which a residual is evaluated [s]."""
 
 
 class Residual:
-    """Root mean squares over the last `SPAN`, relative to the largest rms of the measured drift so far.
+    """Root mean squares of the model's error over the last `SPAN`, relative to the largest rms of the measured drift so
+    far.
 
-    `least` [m] is a lower bound of this reference, because differences below the errors of the sensors are not
-    significant.
+    This reference is at least `least` [m], because differences below the errors of the sensors are not significant.
     """
 
     def __init__(self, dt: float, least: float) -> None:
@@ -141,7 +141,7 @@ class Limit:
         self._counted = False
 
     def exceeded(self, value: float, seconds: float) -> bool:
-        """Whether the limit trips with `value` at `seconds` [s]; NaN does not exceed it."""
+        """Whether `value` at the time `seconds` [s] trips the limit; NaN counts as within the limit."""
         if self.limit is None or not value > self.limit:
             self._since = None
             return False
@@ -153,15 +153,16 @@ class Limit:
 
 
 _TRACE = 0.01
-"""Sampling interval of a trace [s]."""
+"""Interval between the rows of an estimate's trace [s]."""
 
 
 @dataclass(frozen=True)
 class Setting:
     """Sample rate and sensors of the bench.
 
-    `on_ground`: the lasers' signals include the table's displacement. `lag` is their delay relative to the table's
-    accelerometer and displacement sensor [s], `linearity` their largest errors [m], storey 1 first.
+    `on_ground`: the lasers' signals include the table's displacement. `lag` contains the delays of the lasers relative
+    to the table's accelerometer and displacement sensor [s], `linearity` the largest linearity errors of the lasers of
+    storeys 1 and 2 [m].
     """
 
     sample_rate: float
@@ -177,11 +178,11 @@ class NoEstimate(RockbenchError):
 
 
 class Estimator:
-    """Computes estimates from consecutive blocks; the bench is at rest during the first block."""
+    """Computes estimates from consecutive blocks; the bench must be at rest at the first sample."""
 
     def __init__(self, run: int, setting: Setting, members: Members) -> None:
         self._run, self._setting = run, setting
-        # delay the table's signals by the lag of the lasers
+        # delay the table's signals by the lag of the lasers, or the lasers' signals if the lag is negative
         lasers = max(0.0, *(-lag for lag in setting.lag))
         self._resampler = Resampler(setting.sample_rate, (*(lasers + lag for lag in setting.lag), lasers, lasers))
         dt = self._resampler.dt
@@ -206,8 +207,9 @@ class Estimator:
     def take(self, time: float, end: int, signals: Array, measured: Measured | None) -> TwinEstimate | None:
         """Return the estimate at the end of a block, or None if the block is too short for a sample of the model.
 
-        `time` is the time at which the block was read, and `end` the index in the run of the sample after it. `signals`
-        are those of the block, shape (n, n_signals). Raises NoEstimate if the table's acceleration is missing.
+        `time` is the time at which the block was read, and `end` the index, counted in the run, of the sample after the
+        block. `signals` are the signals of the block in SI units, shape (n, n_signals). Raises NoEstimate if samples of
+        the table's acceleration are missing.
         """
         setting = self._setting
         samples, newer = self._resampler.push(signals[:, [ACCELERATION, DISPLACEMENT, LASER_1, LASER_2]])
@@ -233,8 +235,8 @@ class Estimator:
         theta: Array,
         measured: Measured | None,
     ) -> TwinEstimate:
-        """Estimate from u1, u2 and drift, measured (`seen`, shape (3, n)) and modelled (`u`, shape (3, k, n)), and from
-        the modelled `theta`, shape (k, n).
+        """Estimate from u1, u2 and drift [m], both measured (`seen`, shape (3, n)) and modelled (`u`, shape (3, k, n)),
+        and from the modelled rotation `theta` [rad], shape (k, n); k is the number of members.
         """
         low, high = _band(u.swapaxes(0, 1), self._uncertainties[:, None])
         residual, excess = self._residual.push(seen[2], u[2, 0], low[2], high[2])
@@ -263,7 +265,7 @@ class Estimator:
         )
 
     def _trace(self, seconds: float, u: Array, theta: Array, low: Array, high: Array) -> Array:
-        """Trace with the columns `bench.live_values.TWIN_TRACE`."""
+        """Rows of the trace, one every `_TRACE` [s], with the columns of `bench.live_values.TWIN_TRACE`."""
         n = low.size
         rows = np.arange(self._skip, n, self._every)
         self._skip = (self._skip - n) % self._every

@@ -1,7 +1,7 @@
-"""Live twin as a subscriber: the model runs in a separate thread, and the acquisition never waits for it.
+"""Live twin: a subscriber to events whose model runs in a separate thread. Acquisition in real time never waits for it.
 
-The estimate for a block is published with the next block. A late model drops half of its members; one that is a second
-behind is switched off until the rig is armed again.
+An estimate is published with the first block read after it is finished. A late model drops half of its members; one
+that is a second behind is switched off until the rig is armed again.
 """
 
 from collections import deque
@@ -75,15 +75,15 @@ class Applicability:
 Array = NDArray[np.float64]
 
 _LATE = 0.15
-"""Backlog [s], of at least two blocks, at which the model drops members."""
+"""Backlog [s], but not less than two blocks, at which the model drops members."""
 _BEHIND = 1.0
-"""Backlog [s], of at least five blocks, at which the twin is switched off."""
+"""Backlog [s], but not less than five blocks, at which the twin is switched off."""
 _NOT_IN_TIME = "the twin did not keep up and is off until the rig is armed again"
 
 
 @dataclass(eq=False)
 class _Run:
-    """Run of the rig that the model follows."""
+    """State of the twin in one run of the rig."""
 
     estimator: Future[Estimator]
     warn: Limit
@@ -95,7 +95,8 @@ class Twin:
     """Computes estimates during every test, from arming to rest, if the model applies to the mounted specimen.
 
     `publish` is called in the engine's thread. A `patient` twin waits for its model, so that its estimates are
-    reproducible, as needed in virtual time. When a residual exceeds its limit, the twin requests a stop.
+    reproducible, as needed in virtual time. The twin warns when the measured drift exceeds the model's band by more
+    than `twin.residual_warn`, and requests a stop when it exceeds the band by more than `twin.residual_stop`.
     """
 
     def __init__(
@@ -136,7 +137,7 @@ class Twin:
                 self._draw()
             case StateChanged():
                 self._about_to_run = event.after is State.RUNNING
-                # the published gain is that of the preceding test
+                # the last gain published belongs to the preceding test
                 self._measured = None
                 if event.after in (State.IDLE, State.HALTED, State.ARMED):
                     self._end_run()

@@ -1,8 +1,8 @@
 """Readings of the sample clock by a separate process, through a separate connection to a gRPC device server.
 
-The readings do not delay the acquisition loop, and their duration does not depend on its load. Half the difference
-between the transmission times to and from the server shifts every time derived from a call, equally in a check and in a
-run.
+The readings do not delay the acquisition loop, and their duration does not depend on the load of that loop. If the
+transmission times to and from the server differ, every time derived from a reading is shifted by half the difference,
+both in the check of the bench and in a run.
 """
 
 import struct
@@ -22,16 +22,16 @@ _READING = struct.Struct("<dqd")
 _PACE = 0.01
 """Pause between two readings [s]."""
 _GOLDEN = 0.6180339887498949
-"""Phase step between consecutive readings [periods]; its multiples are evenly distributed over a period."""
+"""Phase step between consecutive readings [sample periods]; its multiples are evenly distributed over a period."""
 _IDLE = 0.02
 _MOST = 10_000
 
 Reading = tuple[float, int, float]
-"""A reading: time before [s of the machine's clock], number of samples acquired, time after [s]."""
+"""Reading: machine's clock before the call [s], number of samples acquired, machine's clock after the call [s]."""
 
 
 class ClockWatch:
-    """The process that reads the sample clock, of `rate` [1/s], of the task `name` on `daq.server`."""
+    """Child process that reads the sample clock of the task `name` on `daq.server`; `rate` is its rate [1/s]."""
 
     def __init__(self, daq: Daq, name: str, rate: float) -> None:
         self._child = ChildProcess("drivers.daqmx.clock_watch", name, repr(rate))

@@ -1,7 +1,7 @@
 """Connection to the driver: on this PC, or on a controller behind a gRPC device server.
 
-Connections to a server are encrypted as it offers: TLS, and mutual TLS with a client certificate (wiki of NI's
-grpc-device, "Server Security Support"). The server supports no other credentials.
+Connections to a server can be encrypted with TLS, or with mutual TLS if a client certificate is configured. NI's server
+supports no other credentials (wiki of grpc-device, "Server Security Support").
 """
 
 import socket
@@ -34,7 +34,7 @@ def require_private(server: str) -> None:
     except (OSError, UnicodeError):
         return
     for *_, place in found:
-        # a zone may follow an IPv6 address
+        # an IPv6 address may end with a zone
         if ip_address(str(place[0]).partition("%")[0]).is_global:
             raise InvalidInput("hardware.daq.server", server, _REMEDY)
 

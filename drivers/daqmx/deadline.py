@@ -1,4 +1,4 @@
-"""Calls to a gRPC device server: their time-outs, and their reuse by all tasks."""
+"""Calls to a gRPC device server: their deadlines, and call objects shared by all tasks."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ from typing import Any
 import grpc
 
 _SLOW = {"ResetDevice": 10.0}
-"""Additional time for calls whose requests have no time-out [s]."""
+"""Additional time, by procedure, for slow calls whose requests contain no time-out [s]."""
 _LATE = 0.1
 """Fraction of `patience` allowed for calls after a first time-out."""
 _LEAST = 0.1

@@ -1,4 +1,4 @@
-"""Delays of each input's samples relative to the sample clock, for their correction.
+"""Delay of each input relative to the sample clock, needed to align the signals in time.
 
 The filter of a delta-sigma converter delays its input by about 40 samples; a multiplexer samples its inputs one after
 the other. Inputs on different modules therefore record the same motion at different times.
@@ -19,8 +19,8 @@ from drivers.daqmx.library import InputChannel
 
 @dataclass(frozen=True)
 class InputDelay:
-    """Delay of an input: its sample i is the signal at `seconds` before edge i of the sample clock. A negative delay
-    means a time after the edge.
+    """Delay of an input: its sample i is the value of the signal `seconds` before edge i of the sample clock, or after
+    the edge if `seconds` is negative.
 
     `uncertainty` is the standard uncertainty [s], infinite if the delay is unknown; `source` names the source of the
     value.
@@ -44,9 +44,9 @@ _SAMPLES = 40.0 + 5.0 / 512.0
 _FIGURE = 1.0e-6
 """Standard uncertainty of a delay from specifications [s]: rounding to two digits, tolerance of analogue filters."""
 _KNOWN = {"9234": (2.6e-6, 5.0e-6), "9237": (4.5e-6, _FIGURE), "9239": (3.3e-6, _FIGURE)}
-"""Input delay, by model, of delta-sigma modules without a property for it: time [s] in addition to (40 + 5/512)
-samples, and its standard uncertainty [s], from their specifications and NI's knowledge base, kA00Z0000004A0YSAU. No NI
-document was found that gives this time for the NI 9234; a value between those of related modules is assumed."""
+"""Input delay, by model, of delta-sigma modules that do not report it: time [s] in addition to (40 + 5/512) samples,
+and its standard uncertainty [s], from their specifications and NI's knowledge base, kA00Z0000004A0YSAU. No NI document
+was found that gives this time for the NI 9234; a value between those of related modules is assumed."""
 _CLOCKED = 1.0e-7
 """Standard uncertainty of a time determined by the device's clock [s], a few ticks."""
 _DELTA_SIGMA_BITS = 24
@@ -56,11 +56,12 @@ _DELTA_SIGMA_BITS = 24
 def input_delays(
     task: library.Task, channels: Sequence[InputChannel], devices: Sequence[Connected], rate: float
 ) -> tuple[InputDelay, ...]:
-    """The delay of each input of a clocked task, read from the device if it has a property for it, else tabulated; with
-    infinite uncertainty if it is unknown.
+    """The delay of each input of a task clocked at `rate` [1/s].
 
-    `devices` are the devices of the channels, in order. Removal of the delay by the device itself is switched off, so
-    that the delay is removed in one place only.
+    The delay of a filter is read from the device or, if the device does not report it, tabulated; the uncertainty of an
+    unknown one is infinite. The delay of a multiplexed input follows from the convert rate. `devices` are the devices
+    of the channels, in order. Removal of filter delays by the device is switched off, so that they are corrected only
+    once.
     """
     several = len({device.name for device in devices}) > 1
     steps: dict[str, float | None] = {}
@@ -83,7 +84,7 @@ def _multiplexed(number: int, total: int, step: float | None, rate: float) -> In
         return InputDelay(0.0, _CLOCKED, "first input of its multiplexer")
     if step is not None:
         return InputDelay(-number * step, _CLOCKED, "AI.ConvRate")
-    # the time between two inputs is at most the sample period divided by their number
+    # the time between two inputs is at most the sample period divided by the number of inputs
     return InputDelay(
         0.0,
         number / (total * rate) / sqrt(3.0),

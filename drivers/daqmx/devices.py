@@ -15,7 +15,7 @@ from drivers.daqmx.parameters import AnalogInput, Daq, Tls, device_name
 from sim.errors import InvalidInput
 
 _PATIENCE = 5.0
-"""Time allowed for a call to a server [s], whose driver may have to load first."""
+"""Time allowed for a call to a server [s]; the driver there may have to be loaded first."""
 
 T = TypeVar("T")
 
@@ -52,7 +52,7 @@ class FoundDevice:
         return f"{self.product}, serial number {self.serial}{', simulated' if self.simulated else ''}"
 
     def highest_input_rate(self, channels: int) -> float | None:
-        """Samples per second per channel when `channels` of this device are read."""
+        """Highest sample rate of each channel [1/s] when `channels` of this device are read; None without inputs."""
         if self.input_rate is None or self.total_input_rate is None or self.simultaneous:
             return self.input_rate
         return min(self.input_rate, self.total_input_rate / channels)
@@ -206,7 +206,7 @@ def _require_wiring(given: AnalogInput, device: library.Device) -> None:
     possible = list(channel.ai_term_cfgs)
     if TERMINAL_CONFIGURATIONS[given.wiring] not in possible:
         names = [name for name, configuration in TERMINAL_CONFIGURATIONS.items() if configuration in possible]
-        raise InvalidInput(f"wiring of input {given.terminal}", given.wiring, f"it must be one of {', '.join(names)}")
+        raise InvalidInput(f"wiring of input {given.terminal}", given.wiring, f"it must be one of: {', '.join(names)}")
 
 
 def _require_rate(
@@ -227,6 +227,6 @@ def _require_rate(
             raise InvalidInput(
                 "sample_rate",
                 rate,
-                f"with {channels} in use, the inputs of {device.name} ({device.product}) can be read at"
-                f" {highest:g}/s at most",
+                f"the inputs of {device.name} ({device.product}) can be read at {highest:g}/s at most (inputs in use:"
+                f" {channels})",
             )

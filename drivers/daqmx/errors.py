@@ -20,7 +20,7 @@ from drivers.errors import ConnectionLost, DeviceNotFound, DeviceTimeout, DriveU
 
 @dataclass(frozen=True)
 class _Meaning:
-    """Translation of a group of codes."""
+    """Type of the rig error, and remedy, for a group of error codes."""
 
     error: type[RigError]
     remedy: str
@@ -28,7 +28,7 @@ class _Meaning:
 
 _UNDERFLOW = _Meaning(DriveUnderflow, "the drive was written too late: increase acquisition.lead")
 _OVERFLOW = _Meaning(InputOverflow, "the inputs were read too late: increase hardware.daq.buffer")
-_TIMEOUT = _Meaning(DeviceTimeout, "stop, then check the wiring of clock and trigger, and the CPU load")
+_TIMEOUT = _Meaning(DeviceTimeout, "check the wiring of clock and trigger, and the CPU load")
 _GONE = _Meaning(ConnectionLost, "check power and cables, then open a new session")
 _ABSENT = _Meaning(DeviceNotFound, "`rockbench devices` lists the devices that are present")
 _BUSY = _Meaning(DeviceNotFound, "another program holds the device: end it first")

@@ -21,10 +21,10 @@ from drivers.errors import DeviceTimeout, RigError
 
 @dataclass(frozen=True)
 class InputScaling:
-    """One input: volts = coefficients[0] + coefficients[1] counts + coefficients[2] counts^2 + ...
+    """Scaling of one input: volts = coefficients[0] + coefficients[1] * counts + coefficients[2] * counts**2 + ...
 
-    The coefficients are those of the device's calibration. Counts from `lowest` to `highest` are measurements; beyond
-    them, the converter is saturated. `bits` is the size of a raw sample.
+    The coefficients are those of the device's calibration. Counts from `lowest` to `highest` are valid; outside this
+    range, the converter is saturated. `bits` is the size of a raw sample.
     """
 
     coefficients: tuple[float, ...]
@@ -34,7 +34,7 @@ class InputScaling:
 
 
 def scaling_of(channel: InputChannel, terminal: str) -> InputScaling:
-    """Scaling of a task's input from its device. Raises RigError if the device returns no slope."""
+    """Scaling of a task's input, as reported by the device. Raises RigError if the device reports no slope."""
     coefficients = tuple(float(c) for c in channel.ai_dev_scaling_coeff)
     if len(coefficients) < 2 or coefficients[1] == 0.0:
         raise RigError(f"{terminal} cannot be scaled: its coefficients are {coefficients}; recalibrate it")
@@ -44,10 +44,10 @@ def scaling_of(channel: InputChannel, terminal: str) -> InputScaling:
 
 
 def valid_counts(size: int, resolution: int, *, left: bool) -> tuple[int, int]:
-    """Lowest and highest valid count of a signed converter of `resolution` bits in `size` bits.
+    """Lowest and highest valid count of a signed converter of `resolution` bits whose raw samples have `size` bits.
 
-    At the extreme counts the converter is saturated, so they are excluded. `left`: the sample is left-justified, so
-    that its upper bits are the converter's.
+    The extreme counts are excluded, because the converter is saturated there. `left`: samples are left-justified, so
+    that the converter's bits are the upper ones.
     """
     step = 2 ** (size - resolution) if left else 1
     rail = 2 ** (resolution - 1)
@@ -66,9 +66,10 @@ TERMINAL_CONFIGURATIONS: dict[Wiring, TerminalConfiguration] = {
 
 
 class Inputs:
-    """Task of all `inputs`, in the given order; `devices` are the devices of the inputs, `delays` the inputs' delays.
+    """Task of all `inputs`, in the given order; `devices` are the devices of the inputs, in the same order.
 
-    The output starts on `trigger` and is clocked from `clock`, by default terminals of the inputs' device.
+    `trigger` and `clock` are the terminals from which the output is started and clocked, by default those of the
+    inputs' device; `delays` are the inputs' delays.
     """
 
     def __init__(
@@ -163,7 +164,7 @@ class Inputs:
             terminals = str(task.triggers.start_trigger.term), str(task.timing.samp_clk_term)
             engine = self._engine()
         finally:
-            # a watchdog starts only while nothing is reserved
+            # a watchdog can be started only while no task is reserved
             task.control(TaskMode.TASK_UNRESERVE)
         if engine is not None:
             task.timing.samp_timing_engine = engine

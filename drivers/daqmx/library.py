@@ -160,7 +160,7 @@ class InputLineChannels(Protocol):
 
 
 class CounterChannels(Protocol):
-    """The counter outputs of a task, low at rest; each pulse is high, then low [s]."""
+    """The counter outputs of a task, low at rest; a pulse is high for `high_time`, then low for `low_time` [s]."""
 
     def add_co_pulse_chan_time(
         self, counter: str, *, initial_delay: float, low_time: float, high_time: float
@@ -287,7 +287,7 @@ def system(options: Options) -> System:
 
 
 def task(name: str, options: Options) -> Task:
-    """A new task, or the existing one that `options` name."""
+    """A new task, or the existing task of this name if `options` request to attach to it."""
     return cast(Task, nidaqmx.Task(name, grpc_options=options))
 
 

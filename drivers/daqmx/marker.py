@@ -12,7 +12,7 @@ NAME = "rockbench_marker"
 
 
 class Marker:
-    """Train of `pulses` at `daq.laser_marker`, which begins with the sample clock of each run.
+    """Train of `pulses` of the counter `daq.laser_marker`. It begins when the sample clock of a run starts.
 
     The lasers are on while the output is low. The counters and the sample clock of a device share one timebase.
     """
@@ -23,7 +23,7 @@ class Marker:
         self.counter = _counter(connection, daq)
 
     def prepare(self, trigger: str) -> None:
-        """Create the task, with the output low, that starts on `trigger`."""
+        """Create the task, which starts on `trigger`; until then its output is low."""
         self.clear()
         if self.counter is None:
             return

@@ -26,9 +26,9 @@ _FULL = int(DAQmxErrors.SAMPLES_CAN_NOT_YET_BE_WRITTEN)
 
 
 class Output:
-    """One output on the sample clock at the terminal `clock`.
+    """Analogue output of the drive, clocked from the terminal `clock`.
 
-    Each run has a new task; samples left over from the previous run are discarded.
+    A new task is created for each run; samples left over from the previous run are discarded.
     """
 
     def __init__(self, connection: Connection, daq: Daq, clock: str, rate: float, lead: int) -> None:
@@ -48,7 +48,7 @@ class Output:
             raise
 
     def prepare(self, trigger: str) -> None:
-        """Create a new task, with the output at zero, that starts on `trigger`."""
+        """Set the output to zero and create a new task, which starts on `trigger`."""
         self.clear()
         self.zero()
         task = self._make()
@@ -91,7 +91,7 @@ class Output:
             next(device for device in devices if device.name.lower() == name).reset_device()
 
     def clear(self) -> None:
-        """Stop playing and discard waiting samples; the output holds its last value."""
+        """Stop playing and discard queued samples; the output holds its last value."""
         # a task can be closed only once: nidaqmx releases it even when the driver did not answer
         task, self._task = self._task, None
         self._started, self._prefilled = False, 0

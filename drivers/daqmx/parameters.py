@@ -8,7 +8,7 @@ from sim.errors import InvalidInput
 from sim.parameters import Parameters, quantity
 
 AUTOMATIC = "automatic"
-"""Value of a terminal that the program chooses."""
+"""Value of `laser_marker` with which the program chooses the counter."""
 Wiring = Literal["default", "differential", "pseudodifferential", "RSE", "NRSE"]
 
 
@@ -22,7 +22,7 @@ class AnalogInput(Parameters):
     @field_validator("terminal")
     @classmethod
     def _without_slash(cls, terminal: str) -> str:
-        # NI MAX shows terminals with a leading slash, the names of a device's channels have none
+        # NI MAX shows terminals with a leading slash; the names of a device's channels have none
         return terminal.strip("/")
 
 
@@ -33,12 +33,12 @@ class SafetyInput(Parameters):
     good: Literal["high", "low"] = quantity(
         "high",
         "",
-        "level in the good state: choose the level that a broken wire cannot produce, high on pulled-down inputs",
+        "level of the line in the good state: the level that a broken wire cannot produce, high on pulled-down inputs",
     )
 
 
 class EmergencyStop(SafetyInput):
-    """Second contact of the emergency stop."""
+    """Second contact of the emergency stop, read by the program; the first contact opens the enable chain."""
 
 
 class OverTravel(SafetyInput):
@@ -60,8 +60,8 @@ class AmplifierReady(SafetyInput):
     delay: float | None = quantity(
         None,
         "s",
-        "longest time from closing the enable line to ready, for an amplifier that is ready only while "
-        "enabled; if absent, it is ready beforehand",
+        "longest time from closing the enable line to the ready signal, for an amplifier that is ready only while "
+        "enabled; absent for an amplifier that is ready before it is enabled",
         gt=0,
         le=10,
         usual=(0.02, 5.0),
@@ -77,7 +77,7 @@ class Heartbeat(Parameters):
 
 
 class Tls(Parameters):
-    """Encrypted connection to the gRPC device server, which has certificates in its server_config.json."""
+    """Encrypted connection to the gRPC device server, whose server_config.json names the server's certificates."""
 
     root_certificate: str = quantity(
         "server_self_signed_crt.pem",
@@ -88,7 +88,7 @@ class Tls(Parameters):
     client_certificate: str | None = quantity(
         None,
         "",
-        "PEM file of the client's certificate, relative to this file, for a server that requires one; absent: none",
+        "PEM file of the client's certificate, relative to this file; absent if the server requires none",
         example="client_self_signed_crt.pem",
     )
     client_key: str | None = quantity(
@@ -125,7 +125,7 @@ class Daq(Parameters):
     output: str = quantity("Dev1/ao0", "", "physical channel of the drive output")
     output_range: float = quantity(10.0, "V", "largest magnitude of the drive output", gt=0, le=10, usual=(1.0, 10.0))
     enable_line: str | None = quantity(
-        "Dev1/port0/line0", "", "digital line of the amplifier's enable relay; if absent, there is none"
+        "Dev1/port0/line0", "", "digital line of the amplifier's enable relay; absent if there is no relay"
     )
     start_trigger: str | None = quantity(
         None,
@@ -152,23 +152,25 @@ class Daq(Parameters):
     laser_marker: str | None = quantity(
         None,
         "",
-        "counter output that switches both serial lasers off for 40 short pulses at the beginning of each run, which "
-        "aligns their clocks; automatic: the first counter of the output's device, if the lasers follow it; if absent, "
-        "they are aligned from the arrival times of their values",
+        "counter output whose 40 short pulses at the beginning of each run switch both serial lasers off, which aligns "
+        "their clocks; automatic: the first counter of the output's device, if the lasers respond to its pulses; if "
+        "absent, the clocks are aligned from the arrival times of the values",
         example="Dev1/ctr0",
     )
-    emergency_stop: EmergencyStop | None = quantity(None, "", "emergency stop; absent if not wired")
-    over_travel: OverTravel | None = quantity(None, "", "over-travel switches; absent if not wired")
+    emergency_stop: EmergencyStop | None = quantity(None, "", "contact of the emergency stop; absent if not wired")
+    over_travel: OverTravel | None = quantity(None, "", "contact of the over-travel switches; absent if not wired")
     over_travel_2: OverTravel2 | None = quantity(
-        None, "", "over-travel switch at the other end; absent if over_travel covers both ends, or if not wired"
+        None,
+        "",
+        "contact of the over-travel switch at the other end; absent if over_travel covers both ends, or if not wired",
     )
-    amplifier_ready: AmplifierReady | None = quantity(None, "", "amplifier ready; absent if not wired")
+    amplifier_ready: AmplifierReady | None = quantity(None, "", "ready contact of the amplifier; absent if not wired")
     heartbeat: Heartbeat | None = quantity(None, "", "heartbeat; absent if there is no heartbeat relay")
     buffer: float = quantity(
         10.0, "s", "capacity of the input buffer as a duration: the longest possible delay of a read", ge=1.0, le=60.0
     )
     timeout_margin: float = quantity(
-        2.0, "s", "time allowed for a call to the driver beyond its own duration", ge=0.1, le=60, formerly="patience"
+        2.0, "s", "time allowed for a call to the driver beyond its usual duration", ge=0.1, le=60, formerly="patience"
     )
 
     @property
@@ -178,7 +180,7 @@ class Daq(Parameters):
 
     @property
     def missing_inputs(self) -> tuple[str, ...]:
-        """The names of the safety inputs that are not wired; a single over-travel line may cover both ends."""
+        """The names of the safety inputs that are not wired, except over-travel 2, which over-travel may include."""
         given = self.safety_inputs
         return tuple(name for name in self._possible_inputs if name not in given and name != "over-travel 2")
 

@@ -98,13 +98,13 @@ _PER_TIMEOUT = 4
 """Maximum number of resets within one time-out."""
 _REFUSED = {
     int(DAQmxErrors.WATCHDOG_TIMER_NOT_SUPPORTED): "{device} has no watchdog: remove hardware.daq.watchdog",
-    int(DAQmxErrors.WATCHDOG_TIMEOUT_OUT_OF_RANGE_AND_NOT_SPECIAL_VAL): "it is outside the range of {device}",
+    int(DAQmxErrors.WATCHDOG_TIMEOUT_OUT_OF_RANGE_AND_NOT_SPECIAL_VAL): "the watchdog of {device} does not support it",
 }
 
 
 class Watchdog:
-    """Opens `line` unless reset within `timeout` seconds. Raises InvalidInput if the device has no watchdog or the
-    time-out is too long for it.
+    """Watchdog that sets `line` low, which opens the relay, unless it is reset within `timeout` [s]. Raises
+    InvalidInput if the device has no watchdog or does not support the time-out.
 
     The watchdog is that of the line's device, or that of `chassis` if the device is a module. The watchdog of a chassis
     also sets `output` to 0 V, and expires at once when the chassis loses its network connection; after an expiry the
@@ -138,7 +138,7 @@ class Watchdog:
 
     @property
     def has_barred_chassis(self) -> bool:
-        """Whether the watchdog has expired on a chassis, which must then be reset."""
+        """Whether the watchdog is that of a chassis and has expired; the chassis must then be reset."""
         with translated("reading the watchdog"):
             return self._chassis is not None and self._alive().expired
 
@@ -155,7 +155,7 @@ class Watchdog:
 
     def reset(self) -> None:
         """Reset the watchdog if at least a quarter of the time-out has passed since the last reset. Raises RigError if
-        it has expired.
+        the watchdog has expired.
         """
         if time.monotonic() - self._last_reset >= self._interval:
             with translated("resetting the watchdog, which otherwise opens the enable line,"):
@@ -218,7 +218,7 @@ class Heartbeat:
             raise
 
     def beat(self) -> None:
-        """Toggle the line; the first beat after a rest is a rising edge."""
+        """Toggle the line; the first edge after `rest()` is a rising one."""
         with translated("toggling the heartbeat line"):
             self._writer.write_one_sample_one_line(not self._high, _TIME)
         self._high = not self._high

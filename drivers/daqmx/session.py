@@ -34,19 +34,21 @@ class _State(Enum):
 
 
 class DaqSession:
-    """Output and inputs share the start trigger and the sample clock: output sample i is played while input sample i is
-    acquired.
+    """Session with a DAQ device whose output and inputs share start trigger and sample clock: output sample i is played
+    while input sample i is acquired.
 
     The output is clocked from the terminal of the inputs' sample clock. A device that cannot route this signal rejects
     the output; `hardware.daq.clock` must then name another terminal, or OnboardClock for a separate output clock, which
     starts with the inputs and stays synchronous if both clocks have the same timebase. There is no automatic fallback.
 
-    `pulses` are output at `daq.laser_marker`, beginning with the start of each run. A run is `prepare`, `write` the
-    first samples, `start`, then `write` and `read` in turn, and `stop`. On any failure in between, the relay is opened
-    and the output set to zero before the error is raised. One thread at a time may use a session; `cut`, `stop` and
-    `close` may be called from any other thread. The constructor brings the bench into a safe state before it checks
-    anything. It raises InvalidInput for unsupported settings and for a sample rate that the device cannot produce
-    exactly, and DeviceNotFound if the driver, the server or a device is missing or held by another program.
+    `pulses` are output at `daq.laser_marker`, beginning with the start of each run. A run consists of `prepare`,
+    `write` with the first samples, `start`, `write` and `read` in turn, and `stop`. On any failure during a run, the
+    relay is opened and the output set to zero before the error is raised.
+
+    One thread at a time may use a session; `cut`, `stop` and `close` may be called from any other thread. The
+    constructor brings the bench into a safe state before it checks anything. It raises InvalidInput for unsupported
+    settings and for a sample rate that the device cannot produce exactly, and DeviceNotFound if the driver, the server
+    or a device is missing or held by another program.
     """
 
     def __init__(
@@ -91,7 +93,7 @@ class DaqSession:
 
     @property
     def delays(self) -> tuple[InputDelay, ...]:
-        """Delay of each input, which `read` does not remove."""
+        """Delay of each input; `read` returns the samples uncorrected."""
         return self._tasks.inputs.delays
 
     @property
@@ -110,9 +112,10 @@ class DaqSession:
         return dict(self._description)
 
     def prepare(self) -> None:
-        """Set the output to 0 V, arm it on the inputs' start trigger, and close the enable relay.
+        """Set the output to 0 V, prepare it to start on the inputs' trigger, close the enable relay, and wait for the
+        amplifier. The sample clock is started later, by `start`.
 
-        The sample clock does not run yet.
+        Raises RigError if a step fails; ConnectionLost requires a new session.
         """
         with self._lock:
             self._require(_State.IDLE, "prepare")
@@ -167,7 +170,7 @@ class DaqSession:
         with self._resting_on_failure():
             counts = self._tasks.inputs.read(n)
             if self._state is not _State.RUNNING:
-                # reading a stopped task would restart it
+                # the read may have restarted the stopped task
                 self._tasks.inputs.stop()
                 raise RigError("read was interrupted: the session was stopped")
             self._reset_watchdog()

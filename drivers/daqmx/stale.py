@@ -29,10 +29,10 @@ and at most 0.2 s.
 """
 
 _POLL = 0.05
-"""Time between two readings [s]."""
+"""Time between two readings of the output's write position [s]."""
 
 _UNKNOWN = ("FAILED_PRECONDITION", "NOT_FOUND")
-"""Status codes of a server for an unknown name."""
+"""Status codes with which a server rejects the name of a task that does not exist."""
 
 
 def clear_stale(connection: Connection, devices: Iterable[str]) -> tuple[str, ...]:

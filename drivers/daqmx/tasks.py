@@ -32,8 +32,8 @@ class Tasks:
     """Enable relay, watchdog, heartbeat, safety inputs, output, inputs and marker, on the devices `used`.
 
     If one of the tasks cannot be created, the others are cleared. After construction the relay is open and the output
-    at 0 V. `was_reset`: the device had to be reset to set the output to 0 V, so its tasks are gone. Raises InvalidInput
-    for a sample rate that the device cannot produce exactly.
+    at 0 V. `was_reset`: a device or chassis had to be reset, so that its tasks no longer exist. Raises InvalidInput for
+    a sample rate that the device cannot produce exactly.
     """
 
     def __init__(
@@ -52,7 +52,9 @@ class Tasks:
         self.safety: SafetyInputs | None = None
         self.was_reset = False
         self.ready_delay = None if daq.amplifier_ready is None else daq.amplifier_ready.delay
-        """Longest time from closing the enable line to amplifier ready [s]; None if the two are independent."""
+        """Longest time from closing the enable line to the amplifier's ready signal [s]; None if the signal does not
+        depend on the line.
+        """
         with ExitStack() as made:
             if daq.enable_line is not None:
                 self.relay = EnableLine(connection, daq.enable_line)
@@ -77,7 +79,8 @@ class Tasks:
             self._made = made.pop_all()
 
     def prepare(self, is_cut: Callable[[], bool]) -> None:
-        """Set the output to 0 V, arm it on the inputs' trigger, close the enable relay and wait for the amplifier.
+        """Set the output to 0 V, prepare it to start on the inputs' trigger, close the enable relay and wait for the
+        amplifier.
 
         Raises RigError if a step fails, the amplifier does not report ready, or `is_cut` becomes true.
         """
@@ -181,7 +184,7 @@ class Tasks:
             _require_not_cut(is_cut)
             if clock.now() > deadline:
                 opened = [name for name, is_good in good.items() if not is_good]
-                text = f"{', '.join(opened)} not good {delay:g} s after the enable line was closed"
+                text = f"safety inputs open {delay:g} s after the enable line was closed: {', '.join(opened)}"
                 raise SafetyInputOpen(f"the run cannot be prepared: {text}", opened)
             clock.wait_until(clock.now() + _LOOK)
             if self.watchdog is not None:
@@ -214,7 +217,7 @@ def _quietly(step: Callable[[], None]) -> None:
 
 def _require_rate(what: str, made: float, asked: float) -> None:
     if abs(made - asked) > _SAME_RATE * asked:
-        raise InvalidInput("sample_rate", asked, f"the {what} would run at {made!r}/s; choose a rate that it supports")
+        raise InvalidInput("sample_rate", asked, f"the {what} would run at {made!r}/s; choose a supported rate")
 
 
 _MISSING = "not wired to this program: it must open the enable chain by itself"

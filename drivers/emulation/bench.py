@@ -24,7 +24,8 @@ _IDLE_TURN = 0.02
 
 
 class EmulatedBench:
-    """A `Plant` around the virtual bench, which is advanced by every read, and by a separate thread between reads.
+    """A `Plant` that contains the virtual bench. A read of new ticks advances the bench to the present; between reads,
+    a separate thread advances it.
 
     One tick is one sample of the virtual bench; `clock_error` is the relative error of the tick rate, in addition to
     that of the bench's own sample clock.
@@ -63,7 +64,7 @@ class EmulatedBench:
     def start(self) -> None:
         """Start the thread that advances the bench."""
         while self._displacements.end < 2:
-            # two ticks, so that an interval exists
+            # interpolation requires two ticks
             self._advance()
         self._thread.start()
 
@@ -75,7 +76,7 @@ class EmulatedBench:
 
     @property
     def channels(self) -> tuple[Channel, ...]:
-        """Channels measured at the inputs."""
+        """Channels of the bench, one per input terminal."""
         return self._bench.channels
 
     @property

@@ -107,7 +107,7 @@ class ControlServer:
 
 
 def _requests(lines: BinaryIO) -> Iterator[bytes]:
-    """Received lines; a line longer than `_LONGEST` is truncated to one byte more, so that it is refused."""
+    """Received lines; a line longer than `_LONGEST` is truncated to `_LONGEST + 1` bytes, so that it is refused."""
     while line := lines.readline(_LONGEST + 1):
         part = line
         while part and not part.endswith(b"\n"):
@@ -146,7 +146,7 @@ def ask(address: str, command: str, /, *, patience: float = _PATIENCE, **argumen
         ) from None
     except OSError as error:
         raise ConnectionLost(
-            f"{command} is refused: no connection to the emulated laboratory at {address} ({error});"
+            f"{command} failed: no connection to the emulated laboratory at {address} ({error});"
             " check that it is running and that hardware.emulator_address is its address"
         ) from None
     return _result(address, command, line)

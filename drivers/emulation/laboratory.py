@@ -20,7 +20,7 @@ from sim.specimen import Specimen
 from sim.virtual_bench import VirtualBenchParameters
 
 LATE = 0.05
-"""Delay of the emulated lasers [s] beyond which samples of a client with the default lead are late."""
+"""Delay of the emulated lasers [s] beyond which their values are too late for a client with the default lead."""
 
 
 @dataclass(frozen=True)
@@ -35,9 +35,9 @@ class ClockErrors:
 class Laboratory:
     """Emulated instruments with real wire protocols, connected to one virtual bench in real time.
 
-    `hardware` is the configuration of a client; `modules` are the modules of a chassis. Raises InvalidInput if the
-    devices lack a required function, DeviceNotFound if serial lasers are requested on a system without
-    pseudo-terminals; everything is closed first.
+    `hardware` is the configuration that a client requires; `modules` are the modules of a chassis. Raises InvalidInput
+    if the devices lack a required function, and DeviceNotFound if serial lasers are requested on a system without
+    pseudo-terminals; all instruments opened so far are closed first.
     """
 
     def __init__(
@@ -98,19 +98,21 @@ class Laboratory:
             self._opened = opened.pop_all()
 
     def start(self) -> None:
-        """Switch everything on."""
+        """Start the bench, the lasers and the DAQ server."""
         self.bench.start()
         for laser in self.lasers:
             laser.start()
         self.daq.start()
 
     def late(self) -> dict[str, float]:
-        """Longest delay [s] of each laser whose values this computer has sent late since the last call."""
+        """Longest delay [s] with which this computer has sent values since the last call, by laser; only delays greater
+        than `LATE`.
+        """
         found = {f"laser {storey}": laser.take_lateness() for storey, laser in enumerate(self.lasers, 1)}
         return {name: delay for name, delay in found.items() if delay > LATE}
 
     def close(self) -> None:
-        """Switch everything off and end all threads and processes; may be called repeatedly."""
+        """Close all instruments and end all threads; may be called repeatedly."""
         self._opened.close()
 
     def __enter__(self) -> Self:
@@ -134,8 +136,8 @@ class Laboratory:
         self.bench.perform(OperatorTask(arguments["work"]), arguments.get("amount"))
 
     def _switch_lasers(self, edges: NDArray[np.float64]) -> None:
-        """Switch the lasers at the edges of the counter, which is wired to their on/off inputs: a high level opens
-        them.
+        """Switch the lasers at the edges of the counter, which is wired to their on/off inputs; a high level opens
+        these inputs, so that the lasers are off.
         """
         for laser in self.lasers:
             laser.switch(edges)

@@ -42,7 +42,7 @@ _TRIP = 0.95
 _HOLD = 1.0
 """Time for which the relay of an over-travel switch stays open after the table has returned [s]."""
 _SOFT_START = 0.05
-"""Time from enable to ready of the amplifier [s]."""
+"""Time from enabling the amplifier to its ready signal [s]."""
 _ENDS: tuple[int, ...] = (1, 2)
 
 
@@ -83,7 +83,9 @@ class SafetyChain:
 
     @property
     def inputs(self) -> Mapping[str, Callable[[], bool]]:
-        """Level of each input by contact name: high while the contact is closed."""
+        """Functions that return the level of an input, by contact name: high while the contact is closed and its wire
+        intact.
+        """
         return {name: lambda name=name: self._level(name) for name in INPUTS}
 
     def enable_line(self, high: bool) -> None:

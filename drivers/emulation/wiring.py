@@ -1,4 +1,4 @@
-"""Wiring of the emulated laboratory as a client's configuration."""
+"""Wiring of the emulated laboratory, and the client's configuration that follows from it."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from sim.parameters import Parameters
 from sim.virtual_bench import VirtualBenchParameters
 
 Connection = Literal["serial", "socket", "analogue"]
-"""Connection of the lasers; `socket` is the serial line on a network port."""
+"""Connection of the lasers; `socket` is the serial line through a TCP socket."""
 Device = Literal["usb", "crio", "cDAQ-9174", "cDAQ-9185", "cRIO-9045", "cRIO-9049", "PCIe-6351", "USB-6351"]
 """Selectable devices: `usb` (USB-6363) and `crio` (cRIO-9045 with NI 9239), each with a calibration polynomial, and
 those of `zoo`.
@@ -26,9 +26,9 @@ _BAUD = 921_600
 _WATCHDOG = 1.0
 """Time-out of the device's watchdog on the enable line [s]."""
 HEARTBEAT = 1.5
-"""Time-out of the heartbeat relay [s]; longer than the watchdog's, so that both can be observed."""
+"""Time-out of the heartbeat relay [s]; longer than that of the watchdog, so that the effects can be distinguished."""
 _READY = 1.0
-"""Declared delay of the amplifier: longest time from enable to ready [s]."""
+"""Configured delay of the amplifier: longest time from closing the enable line to the ready signal [s]."""
 _CONTACTS = 4
 """Number of lines for the contacts of the safety chain."""
 
@@ -56,8 +56,9 @@ class Site:
 def site_of(device: Device, modules: Sequence[str] = ()) -> Site:
     """The wiring of a device, or of a chassis with `modules`.
 
-    With two input modules the accelerometer is on the first and everything else on the second. Raises InvalidInput for
-    a chassis without inputs, output or relays, and for modules in a fixed set of devices.
+    With two input modules, the accelerometer is wired to the first and the other sensors to the second. Raises
+    InvalidInput for a chassis without inputs, output or relays, and if `modules` are specified for a fixed set of
+    devices.
     """
     if device in ("usb", "crio"):
         if modules:
@@ -67,7 +68,7 @@ def site_of(device: Device, modules: Sequence[str] = ()) -> Site:
         devices = build(device, modules)
     analogue = [one for one in devices if one.inputs is not None]
     if device == "crio":
-        # the second module has separate terminals
+        # all sensors are wired to the first module; the second one reads other terminals of the plant
         analogue = analogue[:1]
     drive = _first(devices, "an analogue output (9263, 9269)", lambda one: one.output_names)
     relays = _first(devices, "relays or digital outputs (9485, 9401)", lambda one: one.line_names)
@@ -100,7 +101,7 @@ def _first(devices: Sequence[DeviceModel], what: str, has: Callable[[DeviceModel
 
 
 def _contacts(devices: Sequence[DeviceModel], relays: DeviceModel) -> tuple[str, ...]:
-    """The lines of the safety inputs, if possible on a module other than the relays' module."""
+    """The lines of the safety inputs, if possible not on the module of the relays; empty if there are none."""
     for one in sorted(devices, key=lambda one: one is relays):
         names = one.input_line_names
         if one is not relays:

@@ -1,4 +1,4 @@
-"""Channels of the laboratory bench: converter, transducer and sign in one conversion."""
+"""Channels of the laboratory bench: conversion from counts to SI units by converter, transducer and polarity."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from sim.channel import COIL_CURRENT, TABLE_ACCELERATION, TABLE_DISPLACEMENT, TA
 from sim.errors import InvalidInput
 
 _START, _END = 0.004, 0.020
-"""Current at the start and at the end of the measuring range [A] (manual, p. 116)."""
+"""Current at the start and at the end of the measuring range [A] (manual of the optoNCDT 1420, p. 116)."""
 _LOWEST, _HIGHEST = 0.0038, 0.0202
 """Range of valid currents, including the reserve [A] (manual of the IFD2410, p. 71, of the same family).
 
@@ -33,7 +33,7 @@ class AnalogueScaling:
 
 
 def laser_scaling(measuring_range: float, load: float) -> AnalogueScaling:
-    """Scaling from volts over `load` [ohm] to metres, for the standard scaling of the output.
+    """Scaling from the voltage across `load` [ohm] to displacement, for the standard scaling of the laser's output.
 
     Source: d = (I - 4 mA) / 16 mA of the measuring range (manual of the IFD2410, p. 71; of the optoNCDT 1402, p. 31).
     """
@@ -48,7 +48,7 @@ def require_input_range(item: str, input_range: float, load: float) -> None:
     """
     if (needed := _END * load) > input_range * (1.0 + 1e-9):
         allowed = (
-            f"the output of the laser reaches {needed:.4g} V over {load:g} ohm;"
+            f"the output of the laser reaches {needed:.4g} V across {load:g} ohm;"
             f" choose a wider input range, or a load of {input_range / _END:.0f} ohm at most"
         )
         raise InvalidInput(item, input_range, allowed)
@@ -60,15 +60,15 @@ _MEASURED = {
     TABLE_FORCE: ("force", "N"),
     COIL_CURRENT: ("current", "A"),
 }
-"""Quantity and unit of the transducers."""
+"""Quantity and unit of each transducer, by channel name."""
 
 
 class Scaling(Protocol):
-    """Scaling of one input: volts = coefficients[0] + coefficients[1] counts + ..., and the range of valid counts."""
+    """Scaling of one input: volts = coefficients[0] + coefficients[1] * counts + ..., and the range of valid counts."""
 
     @property
     def coefficients(self) -> tuple[float, ...]:
-        """Volts per power of the counts [V]."""
+        """Coefficients [V] of ascending powers of the counts."""
         ...
 
     @property

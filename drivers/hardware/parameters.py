@@ -19,7 +19,7 @@ class CalibratedInput(AnalogInput):
     @model_validator(mode="after")
     def _check_calibration(self) -> "CalibratedInput":
         if self.sensitivity == 0.0:
-            raise InvalidInput("sensitivity", self.sensitivity, "it must be a number of volts per unit other than 0")
+            raise InvalidInput("sensitivity", self.sensitivity, "it must not be 0")
         if abs(self.zero) >= self.range:
             raise InvalidInput("zero", self.zero, f"it must be within the input's range of {self.range:g} V")
         return self
@@ -28,7 +28,7 @@ class CalibratedInput(AnalogInput):
 class TableDisplacement(CalibratedInput):
     """Input of the displacement transducer between table and ground."""
 
-    sensitivity: float = quantity(100.0, "V/m", "volts per metre as calibrated; its sign is the polarity")
+    sensitivity: float = quantity(100.0, "V/m", "volts per metre as calibrated; the sign gives the polarity")
     zero: float = quantity(0.0, "V", "voltage at mid stroke", usual=(1e-3, 2.0))
 
 
@@ -36,7 +36,7 @@ class TableAcceleration(CalibratedInput):
     """Input of the table's accelerometer."""
 
     terminal: str = quantity("Dev1/ai1", "", "physical channel of the input")
-    sensitivity: float = quantity(1.0, "V s2/m", "volts per m/s2 as calibrated; its sign is the polarity")
+    sensitivity: float = quantity(1.0, "V s2/m", "volts per m/s2 as calibrated; the sign gives the polarity")
     zero: float = quantity(0.0, "V", "voltage at rest", usual=(1e-3, 2.0))
 
 
@@ -44,7 +44,7 @@ class TableForce(CalibratedInput):
     """Input of a load cell between armature and table."""
 
     terminal: str = quantity("Dev1/ai4", "", "physical channel of the input")
-    sensitivity: float = quantity(0.01, "V/N", "volts per newton as calibrated; its sign is the polarity")
+    sensitivity: float = quantity(0.01, "V/N", "volts per newton as calibrated; the sign gives the polarity")
     zero: float = quantity(0.0, "V", "voltage without force", usual=(1e-3, 2.0))
 
 
@@ -52,7 +52,7 @@ class CoilCurrent(CalibratedInput):
     """Input of the amplifier's current monitor."""
 
     terminal: str = quantity("Dev1/ai5", "", "physical channel of the input")
-    sensitivity: float = quantity(0.2, "V/A", "volts per ampere as calibrated; its sign is the polarity")
+    sensitivity: float = quantity(0.2, "V/A", "volts per ampere as calibrated; the sign gives the polarity")
     zero: float = quantity(0.0, "V", "voltage without current", usual=(1e-3, 2.0))
 
 
@@ -94,7 +94,7 @@ class Lasers(Parameters):
 
 
 class LaserInput(AnalogInput):
-    """A laser on a storey; terminal, wiring and range are for its analogue output."""
+    """A laser on a storey; terminal, wiring and range apply to its analogue output."""
 
     port: str | None = quantity(
         None,
@@ -121,13 +121,13 @@ class LaserInput(AnalogInput):
 
 
 class Laser1(LaserInput):
-    """The laser on the first storey; terminal, wiring and range are for its analogue output."""
+    """The laser on the first storey; terminal, wiring and range apply to its analogue output."""
 
     terminal: str = quantity("Dev1/ai2", "", "physical channel of the input")
 
 
 class Laser2(LaserInput):
-    """The laser on the second storey; terminal, wiring and range are for its analogue output."""
+    """The laser on the second storey; terminal, wiring and range apply to its analogue output."""
 
     terminal: str = quantity("Dev1/ai3", "", "physical channel of the input")
     port: str | None = quantity(
@@ -179,7 +179,7 @@ class Hardware(Parameters):
 
     @property
     def suspension(self) -> float:
-        """Stiffness between table and ground [N/m]: unknown."""
+        """Stiffness between table and ground [N/m]; 0, because it is unknown."""
         return 0.0
 
     @property

@@ -36,18 +36,19 @@ a reading.
 """
 
 _GOLDEN = 0.6180339887498949
-"""Phase step between consecutive readings [periods]; its multiples are evenly distributed over a period."""
+"""Phase step between consecutive readings [sample periods]; its multiples are evenly distributed over a period."""
 _READINGS = 6
-"""Number of readings of the sample clock after each block; the tightest of several is much tighter than a single
-one.
+"""Number of readings of the sample clock after each block; the best of several bounds the clock much more tightly than
+a single one.
 """
 
 
 class HardwareRig(RigBase):
     """DAQ and lasers as one rig. The sample clock starts with the first block that is read.
 
-    Samples are corrected for the delays of filters and multiplexers. A block is complete when its most delayed input
-    is, so the largest delay is added to `lead`, the number of drive samples that must be queued beyond a block.
+    Samples are corrected for the delays of filters and multiplexers. A block can be returned only when its most delayed
+    input is complete, so the largest delay is added to `lead`, the number of drive samples that must be queued beyond a
+    block.
     `further` are additional sensors. Raises InvalidInput or RigError if the bench differs from the configuration; all
     devices are then closed.
     """
@@ -68,7 +69,7 @@ class HardwareRig(RigBase):
             analogue = tuple(map(_with_delay, scaled, self._daq.delays))
             delays = [channel.delay for channel in analogue]
             self._deskew = Deskew(delays, self._daq.sample_rate, [channel.valid for channel in analogue])
-            # a block is complete when its most delayed input is
+            # a block can be returned only when its most delayed input is complete
             super().__init__(self._daq.drive_range, lead + self._deskew.latency, WallClock())
             self._laboratory = hardware.emulator_address
             if self._laboratory is not None:
@@ -96,7 +97,7 @@ class HardwareRig(RigBase):
         self._failed = False
         self._phase = 0.0
         self.skipped = 0 if self._pulses is None else ceil((self._pulses.end + _SETTLING) * self.sample_rate)
-        """Samples acquired before the first one of each run, for the alignment of the lasers."""
+        """Number of samples acquired before the first sample of each run, for the alignment of the lasers."""
 
     @property
     def alignments(self) -> tuple[Alignment, ...]:
@@ -192,8 +193,8 @@ class HardwareRig(RigBase):
             )
 
     def _observe_clock(self, tracks: Tracks, times: int) -> None:
-        """Read the sample clock between two readings of the machine's clock, which bound it. If a separate process
-        supplies readings, these are used; otherwise the clock is read `times` times here.
+        """Add readings of the sample clock, each bounded by readings of the machine's clock before and after it. If a
+        separate process supplies readings, these are used; otherwise the clock is read `times` times here.
 
         The readings are spread over the sample period: if all were made right after a block, they would have the same
         phase, and the bounds would be no tighter than one period.

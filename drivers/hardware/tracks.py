@@ -1,4 +1,4 @@
-"""Instruments with their own clocks, resampled as tracks on the sample clock."""
+"""Tracks: the values of sensors with their own clocks, resampled to the sample clock."""
 
 from collections.abc import Sequence
 from contextlib import ExitStack, suppress
@@ -22,12 +22,12 @@ from drivers.timebase.sensor_track import SensorTrack
 from sim.errors import InvalidInput
 
 _SHARE, _RESERVE = 0.5, 0.1
-"""Longest wait for late values, as a fraction of the time for which the queued drive lasts, or as that time less a
-reserve [s], whichever is longer. The rest of the time is left for the next write.
+"""Limits of the wait for late values: the fraction `_SHARE` of the time for which the queued drive lasts, or this time
+less `_RESERVE` [s], whichever is longer. The rest of the time is left for the next write.
 """
 _LONGEST, _LEAST = 0.4, 0.05
-"""Delay up to which a block waits for late values [s], shorter than the default of `limits.late`; and the longest wait
-of a block that is already later [s], so that values received during a stall of the program are included.
+"""`_LONGEST`: delay up to which a block waits for late values [s], shorter than the default of `limits.late`. `_LEAST`:
+longest wait of a block that is already later [s], so that values received during a stall of the program are included.
 """
 
 
@@ -37,7 +37,7 @@ MARKS = Marks(LOST, LATE, IMPLAUSIBLE)
 
 
 class Readings(Protocol):
-    """Values in order, each array of shape (n,); see `SensorTrack.add`."""
+    """Consecutive values of a sensor, each array of shape (n,); see `SensorTrack.add`."""
 
     @property
     def index(self) -> NDArray[np.int64]:
@@ -120,7 +120,9 @@ class Tracks:
         self.channels: tuple[Channel, ...] = tuple(track.channel for track in self._tracks)
 
     def begin(self, sample_rate: float, clock: Clock) -> None:
-        """Begin a run with a new sample clock; the history of the sensors' clocks is kept."""
+        """Begin a run with a new sample clock; the history of the sensors' clocks is kept. Before the first run, waits
+        until these clocks have been observed for the longest `observation_time`.
+        """
         clock.wait_until(self._known_from)
         self._take()
         for track, raw in zip(self._tracks, self._raw, strict=True):
@@ -159,7 +161,7 @@ class Tracks:
         return tuple(track.channel.name for track in self._tracks if not track.placing.mark(self._running, pulses))
 
     def raw(self) -> tuple[RawValues, ...]:
-        """The values received since the last call, or since the run began, before resampling."""
+        """The values, before resampling, that were received since the last call or since the run began."""
         # if a sensor has failed, the values received before the failure are returned
         with suppress(RigError):
             self._take()

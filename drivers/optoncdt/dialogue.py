@@ -24,8 +24,8 @@ class Reply:
     def __init__(self) -> None:
         self.complete = False
         self.prompt_in_value = False
-        """Whether bytes like a prompt were received that may be part of a value; they are accepted as the prompt if no
-        certain one follows.
+        """Whether bytes were received that resemble a prompt but may be part of a value; they are accepted as the
+        prompt if no unambiguous one follows.
         """
         self.rest = b""
         """Bytes after the prompt."""
@@ -55,8 +55,8 @@ class Reply:
 def error_in(command: str, lines: list[str]) -> str | None:
     """The code and text of the sensor's error in the lines that answer `command`; None if the command succeeded.
 
-    A code is at the beginning of a line or after the echo of the command. A warning, W and a number, does not prevent
-    execution of the command (manual of the optoNCDT 1320, p. 82).
+    A code is at the beginning of a line or after the echo of the command. A warning (W and a number) does not prevent
+    the execution of the command (manual of the optoNCDT 1320, p. 82).
     """
     name = re.escape(command.split()[0])
     for line in lines:
@@ -87,7 +87,7 @@ class CommandRefused(RigError):
 
     def __init__(self, who: str, command: str, answer: str) -> None:
         if answer.startswith("E202"):
-            remedy = "switch it to the professional user level in its web interface"
+            remedy = "select the professional user level in the sensor's web interface"
         else:
             remedy = "check the command in the manual of the sensor's firmware"
         super().__init__(f"{who} refused {command}: {answer}; {remedy}")

@@ -69,5 +69,5 @@ def test_raw_values_of_another_type_name_the_backend(given: object) -> None:
         def raw_values(self) -> Any:
             return given
 
-    with pytest.raises(BackendFault, match=r"loopback.*as raw values of its sensors"):
+    with pytest.raises(BackendFault, match=r"loopback.*raw values .* must be a tuple of valid RawValues"):
         CheckedRig(Lying(), "loopback").raw_values()

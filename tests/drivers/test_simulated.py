@@ -88,7 +88,7 @@ def test_a_refused_drive_ends_the_run() -> None:
 def test_underflow_says_what_was_missing() -> None:
     rig = started(simulated(), 20)
     rig.read(20)
-    with pytest.raises(DriveUnderflow, match="sample 20: 100 samples were queued and 105"):
+    with pytest.raises(DriveUnderflow, match="sample 20: 100 of 105 required samples were queued"):
         rig.read(5)
 
 

@@ -91,7 +91,7 @@ class AnalogInput:
 
     @property
     def highest_rate(self) -> float:
-        """Highest sample rate per channel of the slowest device."""
+        """Highest sample rate per channel that all devices of the task support [1/s]."""
         rates: list[float] = []
         for name in self.devices:
             mine = [channel.inputs for channel in self.inputs if channel.device.name == name]
@@ -101,7 +101,7 @@ class AnalogInput:
 
     @property
     def converters(self) -> list[DeltaSigma]:
-        """The task's delta-sigma converters, which restrict the rates; none for other types."""
+        """The task's delta-sigma converters, which restrict its sample rates; empty without such converters."""
         return [one.inputs.delta_sigma for one in self.inputs if one.inputs.delta_sigma is not None]
 
     def conversion(self, device: str) -> float | None:
@@ -149,7 +149,7 @@ class AnalogInput:
 
     @property
     def position(self) -> int:
-        """The number of the next sample to be read."""
+        """Index of the next sample to be read."""
         return self._position
 
     def engage(self, is_free: Callable[[str], bool]) -> None:
@@ -221,7 +221,7 @@ class AnalogInput:
         return seen
 
     def _at(self, first: int, n: int) -> Counts:
-        """Counts at the inputs at `n` consecutive ticks."""
+        """The plant's counts at `n` consecutive ticks from `first` on, shape (n, channels)."""
         columns = [channel.terminal for channel in self.inputs]
         try:
             rows = self._plant.inputs(first, n)

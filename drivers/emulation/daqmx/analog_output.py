@@ -88,7 +88,7 @@ class AnalogOutput:
 
     @property
     def highest_rate(self) -> float:
-        """Highest sample rate per channel of the slowest device."""
+        """Highest sample rate per channel that all devices of the task support [1/s]."""
         return min(channel.highest_rate for channel in self.outputs)
 
     @property
@@ -167,7 +167,7 @@ class AnalogOutput:
             raise _underflow()
 
     def put(self, volts: NDArray[np.float64]) -> None:
-        """Output these values now, shape (channels,)."""
+        """Output these values [V], shape (channels,), from the next tick on."""
         self._require_in_range(volts[np.newaxis])
         with self._instant.next():
             for channel, value in zip(self.outputs, volts, strict=True):

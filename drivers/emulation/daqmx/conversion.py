@@ -25,7 +25,7 @@ class DeltaSigma:
 
     The delay is caused by the digital filter (NI knowledge base, kA00Z0000004A0YSAU, "Calculate the Input Delay").
     `readable`: whether the device has the properties AI.FilterDelay and AI.RemoveFilterDelay. Without them, the driver
-    does not remove the delay: a client must account for the differences (NI-DAQmx help, "cdaqmultidevice").
+    does not remove the delay; a client must correct the difference between modules (NI-DAQmx help, "cdaqmultidevice").
     """
 
     timebase: float
@@ -56,7 +56,7 @@ def delta_sigma_rate(asked: float, converters: Sequence[DeltaSigma]) -> float:
 
 
 def conversion_period(fastest: float, channels: int, rate: float) -> float:
-    """Time between the conversions of two channels of a multiplexer [s]: the shortest plus the settling time, or, at
-    sample rates that leave no time for it, an equal share of the sample period.
+    """Time between the conversions of two channels of a multiplexer [s]: the shortest conversion time `fastest` [s]
+    plus the settling time, or, at sample rates too high for this, an equal share of the sample period.
     """
     return min(fastest + (_PADDING if channels > 1 else 0.0), 1.0 / (rate * channels))

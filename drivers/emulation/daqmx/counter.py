@@ -10,7 +10,9 @@ from drivers.emulation.daqmx.errors import NotEmulated
 from drivers.emulation.plant import Plant
 
 Edges = Callable[[NDArray[np.float64]], None]
-"""Receiver of the times [s] of all edges of a train, shape (2 n,), the first one rising; empty when it stops."""
+"""Receiver of the times [s] of all edges of a train of n pulses, shape (2 n,), the first edge rising; it receives an
+empty array when the train stops.
+"""
 _TIMEBASE = 100.0e6
 """Fastest internal timebase of the counters [1/s] (X Series User Manual, "Counters")."""
 
@@ -30,7 +32,8 @@ class PulseChannel:
 class CounterOutput:
     """`Job` of one counter output, on the timebase of its device. The output is low at rest.
 
-    After the delay from its start, each pulse is high, then low (NI-DAQmx help, "Pulse Train Generation").
+    The first pulse begins after the initial delay; each pulse is high, then low (NI-DAQmx help, "Pulse Train
+    Generation").
     """
 
     start_terminal: str | None = None

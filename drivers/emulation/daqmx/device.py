@@ -18,7 +18,7 @@ _STRAIGHT: Mapping[int, tuple[float, ...]] = MappingProxyType({})
 
 
 Seen = NDArray[np.int16 | np.int32 | np.float64]
-"""Counts of the plant; between two of its ticks they are interpolated and not integers."""
+"""Counts of the plant; between two ticks, they are interpolated and therefore not integers."""
 START, CLOCK = "StartTrigger", "SampleClock"
 """Signals of a timing engine."""
 
@@ -38,9 +38,10 @@ class AnalogInputs:
     terminal.
 
     `ranges` are the largest magnitudes [V], widest first; rates are in 1/s. The converter has `resolution` bits in raw
-    samples of `raw_bits`. `polynomials` are, for single inputs, volts per power of the counts in the widest range; the
-    others are linear, with their rails at the ends of the range. `delta_sigma` describes converters of that type;
-    `conversion` is the fastest conversion of a multiplexed converter [s], None for simultaneously sampled inputs.
+    samples of `raw_bits`. `polynomials` contains, by input, the coefficients [V] of a calibration polynomial in the
+    counts for the widest range, in ascending order; other inputs are linear, with their rails at the ends of the range.
+    `delta_sigma` describes converters of that type; `conversion` is the shortest conversion time of a multiplexed
+    converter [s], None for simultaneously sampled inputs.
     """
 
     count: int
@@ -153,7 +154,7 @@ class InputConverter:
 
     `source` is the converter that produces the plant's counts.
 
-    volts = coefficients[0] + coefficients[1] raw + coefficients[2] raw^2 + ...
+    volts = coefficients[0] + coefficients[1] * raw + coefficients[2] * raw**2 + ...
     """
 
     def __init__(self, inputs: AnalogInputs, k: int, range: float, source: Converter) -> None:
@@ -211,8 +212,8 @@ _WIRING_OF = {
 
 @dataclass
 class FilterDelay:
-    """Settings of a converter with properties for its delay: whether whole samples of the delay are removed, and the
-    unit of the delay.
+    """Settings of a converter that reports its delay: whether the device removes the whole samples of the delay, and
+    the unit in which the delay is reported.
     """
 
     removed: bool = True

@@ -169,7 +169,7 @@ class Driver:
         self.changed.notify_all()
 
     def expire(self, parts: Sequence[DeviceModel], lines: dict[str, bool], volts: dict[str, float]) -> None:
-        """Set the outputs of devices whose watchdog has expired, and reject writes to their lines.
+        """Set `lines` and `volts` of the devices `parts`, whose watchdog has expired, and reject writes to their lines.
 
         A chassis rejects every operation until it is reset (cDAQ-9185 User Manual, "Watchdog Timer").
         """
@@ -241,7 +241,7 @@ def _begin(task: Task, job: Job, tick: int) -> None:
 
 
 def _is_started_by(waiting: Job, fired: Job) -> bool:
-    """Whether the starting job supplies all signals (trigger, clock) for which a job waits."""
+    """Whether the job `fired`, which starts now, supplies all signals (trigger, clock) for which `waiting` waits."""
     triggered = waiting.awaited is None or _same(waiting.awaited, fired.start_terminal)
     return triggered and (waiting.source is None or _same(waiting.source, fired.clock_terminal))
 

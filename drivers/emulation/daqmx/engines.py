@@ -33,7 +33,7 @@ class EngineSlot:
         return None if number is None else f"/{device.clockwork}/{engines[number]}/{signal}"
 
     def resource(self, device: DeviceModel, engines: tuple[str, ...]) -> str:
-        """The reserved engine."""
+        """Name of the task's engine as a resource that a task reserves."""
         return f"{device.clockwork} timing engine {engines[self.number(engines) or 0]}"
 
     def request(self, number: int, engines: tuple[str, ...]) -> None:

@@ -1,4 +1,4 @@
-"""Errors of a DAQmx driver and its gRPC server, before their transmission."""
+"""Errors of the emulated DAQmx driver and its gRPC server, as raised before they are sent to a client."""
 
 from nidaqmx.error_codes import DAQmxErrors
 

@@ -20,9 +20,10 @@ _PATIENCE = 10.0
 
 
 class Generation:
-    """Samples of all channels of an output task, by number.
+    """Samples of all channels of an output task in one run, by index.
 
-    Before the start, `buffer` samples fit; while running, the device's `memory` samples in addition.
+    The capacity is `buffer` samples before the start, and `buffer + memory` samples while running, where `memory` is
+    the part of the device's memory in use.
     """
 
     def __init__(self, channels: int, clock: SampleClock, buffer: int, memory: int) -> None:
@@ -55,7 +56,7 @@ class Generation:
         return capacity - (self.written - self.played(tick))
 
     def tick_of_space(self, samples: int) -> int | None:
-        """Tick at which there will be space for `samples`, at most for the whole capacity; None while not running."""
+        """Tick at which there will be space for `samples` samples (at most the capacity); None while not running."""
         if self._first is None:
             return None
         capacity = self._buffer + self._memory
@@ -97,7 +98,7 @@ class Instant:
 
     @contextmanager
     def next(self) -> Generator[int]:
-        """Context manager that provides the next tick, which cannot be read in its body."""
+        """Context manager that provides the next tick; the plant cannot read this tick before the context ends."""
         with self.lock:
             yield self._tick() + 1
 
@@ -110,7 +111,7 @@ class OutputTerminal:
         self._changes: deque[tuple[int, Signal]] = deque([(0, _constant(0.0))])
 
     def __call__(self, first: int, n: int) -> NDArray[np.float64]:
-        """Volts at `n` past ticks from `first` on, shape (n,). Ticks are read in order; earlier values are
+        """Volts at `n` past ticks from `first` on, shape (n,). Ticks must be read in order, since earlier changes are
         discarded.
         """
         with self._instant.lock:
@@ -138,7 +139,7 @@ class OutputTerminal:
             self.hold(self.volts_at(tick - 1))
 
     def volts_at(self, tick: int) -> float:
-        """Volts at one tick, which is the last one read or a later one."""
+        """Volts at `tick`, which must not precede the last tick read."""
         with self._instant.lock:
             signal = next(signal for start, signal in reversed(self._changes) if start <= tick)
             return float(signal(tick, 1)[0])

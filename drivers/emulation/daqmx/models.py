@@ -12,7 +12,7 @@ from drivers.emulation.daqmx.errors import DaqmxFailure
 from drivers.emulation.daqmx.zoo import build
 
 _CALIBRATED = 2
-"""The input with a non-linear calibration, if any: the input for the first laser's analogue output."""
+"""Index of the input with a non-linear calibration, if any: the input of the analogue output of laser 1."""
 _BEND = 1.0e-4
 """Contribution of each of the square and cubic terms of the calibration at full scale, relative to the range."""
 
@@ -63,7 +63,9 @@ def compact_rio(name: str = "cRIO1", *, simulated: bool = False, calibrated: boo
 
 
 def _polynomials(bits: int, span: float = 10.0) -> dict[int, tuple[float, ...]]:
-    """Volts per power of the counts for the one non-linear input, of `bits` over +-`span` volts."""
+    """Calibration polynomial of the non-linear input, by the index of this input: coefficients [V] of ascending powers
+    of the counts, for `bits` over +-`span` volts.
+    """
     full = 2.0 ** (bits - 1)
     return {_CALIBRATED: (5e-5 * span, (1.0 + 2e-4) * span / full, _BEND * span / full**2, -_BEND * span / full**3)}
 

@@ -1,4 +1,4 @@
-"""Server at a network address: devices wired to a plant, and faults on request."""
+"""Emulated gRPC device server at a network address: devices wired to a plant, and faults on request."""
 
 # ruff: noqa: ARG002 - gRPC passes a context to every call
 
@@ -135,7 +135,7 @@ class NiDaqmx(
 
 
 class SessionUtilities(SessionUtilitiesServicer):
-    """EnumerateDevices, ResetServer."""
+    """Calls EnumerateDevices and ResetServer."""
 
     def __init__(self, driver: Driver) -> None:
         self._driver = driver
@@ -161,7 +161,7 @@ class SessionUtilities(SessionUtilitiesServicer):
 
 
 _WORKERS = 32
-"""Concurrent calls; a waiting read occupies one of them."""
+"""Maximum number of concurrent calls, including reads and writes that wait."""
 
 
 class DaqServer:
@@ -169,10 +169,10 @@ class DaqServer:
 
     `drive` is the analogue output that drives the plant and `enable_line` the digital line of its enable relay; the
     defaults are the first of each on the devices. `wires` replaces the wiring of the digital lines when more than the
-    relay is connected. `converter` produces the plant's counts. With `credentials` the server is encrypted, otherwise
-    plain. `output_clock_error` is the relative excess rate of an output that does not follow the inputs' sample clock;
-    the inputs' sample counter advances in steps of `packet`, as with packet transfer. Raises InvalidInput if the
-    address is not available, or the devices lack `drive` or `enable_line`.
+    relay is connected. `converter` produces the plant's counts. With `credentials`, connections are encrypted.
+    `output_clock_error` is the relative error (positive: fast) of the rate of an output that does not follow the
+    inputs' sample clock. The inputs' sample counter advances in steps of `packet`, as with packet transfer. Raises
+    InvalidInput if the address is not available, or if the devices lack `drive` or `enable_line`.
     """
 
     def __init__(
@@ -223,7 +223,7 @@ class DaqServer:
             )
         except RuntimeError as error:
             self._pool.shutdown()
-            raise InvalidInput("address", address, "it is in use already, or there is no such address") from error
+            raise InvalidInput("address", address, "it is already in use, or does not exist") from error
         self.address = f"{host}:{port}"
 
     @property
@@ -242,7 +242,7 @@ class DaqServer:
         self._server.start()
 
     def close(self) -> None:
-        """Switch devices and server off, end all threads and free the port; may be called repeatedly."""
+        """Stop the server, reset the devices, end all threads and free the port; may be called repeatedly."""
         self._faults.end()
         gone = self._server.stop(None)
         # also ends waiting reads and writes
@@ -277,7 +277,7 @@ class DaqServer:
 
 
 def _chosen(item: str, given: str | None, known: Sequence[str]) -> str | None:
-    """The specified terminal, by default the first."""
+    """The specified terminal, by default the first one; None if none is specified and none exists."""
     if given is None:
         return known[0] if known else None
     if given not in known:

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from drivers.emulation.daqmx.errors import DaqmxFailure
 
 _SOON = 5.0e-5
-"""Tolerance for clock readings that precede the expected tick because of rounding [s]."""
+"""Shortest wait [s], needed if a clock reading precedes the expected tick because of rounding."""
 
 
 def deadline_after(timeout: float) -> float:
-    """Deadline [s of the monotonic clock] of a call with this DAQmx time-out [s]; infinite for -1."""
+    """Deadline [s of the monotonic clock] of a call with this DAQmx time-out [s]; infinite for a negative time-out."""
     return float("inf") if timeout < 0.0 else time.monotonic() + timeout
 
 
@@ -38,7 +38,7 @@ _SAME = 1.0e-9
 class SampleClock:
     """One sample every `divider` ticks: `rate` samples per second. `samples` is the requested buffer size per channel.
 
-    `error` is the relative excess rate of the clock over the plant's ticks.
+    `error` is the relative error of the clock with respect to the plant's ticks; a positive one makes it fast.
     """
 
     divider: int
@@ -55,7 +55,7 @@ class SampleClock:
         return first + ceil(samples * self.divider / (1.0 + self.error))
 
     def passed(self, first: int, tick: int) -> int:
-        """Number of samples up to `tick` if sample 0 is at tick `first`."""
+        """Number of samples up to and including `tick` if sample 0 is at tick `first`."""
         return max(int(self.numbers(first, np.array([tick]))[0]) + 1, 0)
 
     def numbers(self, first: int, ticks: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -66,10 +66,10 @@ class SampleClock:
 
 
 def sample_clock(asked: float, highest: float, tick_rate: float, samples: int, error: float = 0.0) -> SampleClock:
-    """The clock of a device for `asked` samples per second: the lowest supported rate not below it.
+    """Sample clock with the lowest supported rate not below `asked` [1/s]. Raises DaqmxFailure above `highest` [1/s].
 
-    All supported rates are the tick rate divided by an integer, at most `highest`, as with delta-sigma converters (NI
-    9239 data sheet).
+    The supported rates are `tick_rate` [1/s] divided by an integer, as with delta-sigma converters (NI 9239 data
+    sheet).
     """
     if not 0.0 < asked <= highest * (1.0 + _SAME):
         raise DaqmxFailure(

@@ -81,7 +81,7 @@ class Watchdog:
     def hold_at(self, volts: dict[str, float]) -> None:
         """Set the voltages that analogue outputs take on expiry.
 
-        Raises DaqmxFailure on a device that sets lines only.
+        Raises DaqmxFailure for a device whose watchdog sets only digital lines.
         """
         if len(self._parts) == 1:
             raise DaqmxFailure(

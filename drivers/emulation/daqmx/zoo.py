@@ -18,7 +18,9 @@ _FILTER = 40.0 + 5.0 / 512.0
 
 _SINGLE_ENDED = Wirings.RSE | Wirings.NRSE | Wirings.DIFFERENTIAL
 _MODULE_MEMORY = 127
-"""Samples per slot without regeneration (NI cDAQ-9174 Specifications, "Analog Output", "AO FIFO")."""
+"""Length of the output FIFO of a slot [samples], without regeneration (NI cDAQ-9174 Specifications, "Analog Output",
+"AO FIFO").
+"""
 
 
 def _outputs() -> AnalogOutputs:
@@ -84,7 +86,7 @@ MODULES: dict[str, DeviceModel] = {
     "9269": DeviceModel("", "NI 9269", outputs=_outputs()),
     # NI 9401 Operating Instructions and Specifications, p. 7: two ports of four lines, each with one direction
     "9401": DeviceModel("", "NI 9401", lines=8, input_lines=8, direction_group=4),
-    # NI 9421 and NI 9485 Specifications: eight inputs; eight relays
+    # NI 9421 Specifications: eight inputs; NI 9485 Specifications: eight relays
     "9421": DeviceModel("", "NI 9421", input_lines=8),
     "9485": DeviceModel("", "NI 9485", lines=8),
 }
@@ -115,12 +117,12 @@ CHASSIS: dict[str, tuple[int, DeviceModel]] = {
     "cRIO-9045": (8, _crio("cRIO-9045")),
     "cRIO-9049": (8, _crio("cRIO-9049")),
 }
-"""Number of slots, and the chassis."""
+"""Number of slots, and model of the chassis, by name."""
 
 
 def _x_series(product: str, *, transfer_condition: bool) -> DeviceModel:
-    """An NI 6351: a multiplexed converter of 1.25 MS/s, 1 MS/s shared by several channels (6368 User Manual, table
-    4-5).
+    """An NI 6351. Its multiplexed converter samples one channel at up to 1.25 MS/s, or several channels at 1 MS/s in
+    total (6368 User Manual, table 4-5).
 
     Its watchdog acts on digital lines only (X Series User Manual, "Digital Output", "Watchdog Timer"). It has four
     counters (X Series User Manual, "Counters").
@@ -156,11 +158,11 @@ SINGLE: dict[str, DeviceModel] = {
 NAMES = (*CHASSIS, *SINGLE)
 """The devices that can be emulated, by name."""
 SUGGESTED = ("9205", "9263", "9401", "9485")
-"""Modules in a chassis by default: inputs, output, digital inputs, relays."""
+"""Modules in a chassis by default: analogue inputs, analogue outputs, digital lines, relays."""
 
 
 def build(device: str, modules: Sequence[str] = ()) -> tuple[DeviceModel, ...]:
-    """The device, or the chassis with `modules` in its slots starting with the first.
+    """The device; for a chassis, the chassis and its modules: `modules`, or by default `SUGGESTED`, from slot 1 on.
 
     Inputs 0, 1, 2, ... of every input module are wired to terminals 0, 1, 2, ... of the plant, in parallel. Raises
     InvalidInput for an unknown device or module, for too many modules, and for modules without a chassis.
@@ -195,5 +197,7 @@ def build(device: str, modules: Sequence[str] = ()) -> tuple[DeviceModel, ...]:
 
 
 def _on_bus(outputs: AnalogOutputs | None, chassis: DeviceModel) -> AnalogOutputs | None:
-    """Outputs in a chassis; only a controller, which uses bus mastering, has a transfer condition."""
+    """Outputs of a module in `chassis`. Their transfer condition can be set only if the chassis is a CompactRIO
+    controller, which uses bus mastering.
+    """
     return None if outputs is None else replace(outputs, transfer_condition=chassis.category is _CRIO)

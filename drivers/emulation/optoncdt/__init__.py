@@ -1,1 +1,1 @@
-"""Emulated laser optoNCDT 1420 on a pseudo-terminal: measuring clock, stream of values, commands and faults."""
+"""Emulated laser optoNCDT 1420: measuring clock, stream of values, commands and faults."""

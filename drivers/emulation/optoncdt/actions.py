@@ -29,9 +29,7 @@ class Identity:
 
     @property
     def lines(self) -> list[str]:
-        """The text that identifies the sensor; layout and other entries as in the manual of the optoNCDT 1420, p.
-        97.
-        """
+        """The lines that identify the sensor; layout and other entries as in the manual of the optoNCDT 1420, p. 97."""
         return [
             f"Name:            {self.name}",
             f"Serial:          {self.serial}",
@@ -53,7 +51,7 @@ class Mastering:
         self._deadline = now + _MASTERING_TIME
 
     def outcome(self, now: float) -> list[str] | None:
-        """The answer, once available. Raises Refusal after the time-out."""
+        """The answer; None while no valid distance has been measured. Raises Refusal after the time-out."""
         if self._sensor.master(self._value, now):
             return self._done
         if now >= self._deadline:
@@ -90,7 +88,7 @@ class Actions:
         return [f"{request.text} ok"] if self._sensor.settings.echo else []
 
     def require_professional(self) -> None:
-        """Raise Refusal at the user level that has read access only."""
+        """Raise Refusal at the user level USER, which has read access only."""
         if not self._sensor.settings.professional:
             raise Refusal(202, "Access denied")
 

@@ -19,12 +19,14 @@ if sys.platform != "win32":
 _TCGETS2 = 0x802C542A
 """Linux ioctl request for terminal settings with numeric speeds."""
 _SPEED_AT = 40
-"""Offset of the output speed in the reply: after four flags, a byte, nineteen control characters and one speed."""
+"""Offset of the output speed in the reply [bytes]: after four flag words, one byte, nineteen control characters and the
+input speed.
+"""
 _MOST = 4096
-"""Bytes per read."""
+"""Maximum number of bytes per read."""
 _CAPACITY = 640 * 1024
-"""Bytes that Linux keeps for a serial port whose reader is late (TTYB_DEFAULT_MEM_LIMIT); for a pseudo-terminal, only
-16 KiB, a third of a second of 4000 measurements/s with counter and time stamp.
+"""Bytes that Linux keeps for a serial port whose reader is late (TTYB_DEFAULT_MEM_LIMIT). For a pseudo-terminal it
+keeps only 16 KiB, which 4000 measurements/s with counter and time stamp fill in a third of a second.
 """
 
 
@@ -168,7 +170,7 @@ class Dialogue:
         return _reply(answer)
 
     def _finish(self, now: float) -> bytes:
-        """The pending answer, once available."""
+        """The pending answer; empty until it is available."""
         if self._waiting is None:
             return b""
         try:

@@ -1,4 +1,4 @@
-"""Codes of distances, with optical errors, moving mean, mastering and hold, and the bytes of codes on the line."""
+"""Conversion of distances to codes, with optical errors, moving mean, mastering and hold, and of codes to bytes."""
 
 from enum import IntEnum
 
@@ -61,7 +61,7 @@ def words(blocks: NDArray[np.int64]) -> NDArray[np.uint8]:
 Array = NDArray[np.float64]
 
 _RESERVE = 0.01
-"""Reserve beyond each end of the measuring range, within which distances are measured, as a fraction of the range."""
+"""Reserve beyond each end of the measuring range, in which distances are still measured, as a fraction of the range."""
 
 
 class Optics:
@@ -94,8 +94,8 @@ class Evaluation:
         self._age = np.inf
 
     def codes(self, shares: Array, faults: NDArray[np.int64], settings: Settings) -> NDArray[np.int64]:
-        """Codes of measurements, shape (n,), n > 0: of `shares` (fractions of the range) where `faults` is zero,
-        elsewhere the fault.
+        """Codes of the next measurements, shape (n,) with n > 0, after averaging, mastering and hold: those of the
+        distances `shares` (fractions of the range) where `faults` is zero, elsewhere the fault.
         """
         valid = faults == 0
         shares = self._mean(np.where(valid, shares, np.nan), settings.average)

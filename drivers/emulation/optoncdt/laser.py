@@ -1,4 +1,4 @@
-"""Emulated optoNCDT 1420 on a serial port."""
+"""Emulated optoNCDT 1420 on a serial port or a socket."""
 
 import threading
 import time
@@ -33,14 +33,16 @@ class Line:
         self.probability = 0.0
         """Probability of the loss of a byte."""
         self.garbage = 0
-        """Number of pending noise bytes."""
+        """Number of noise bytes to be sent next."""
         self.silent_until = -np.inf
-        """End of the period without output [s]."""
+        """End of the period without output [s of the monotonic clock]."""
         self.splits_words = False
         """Whether an answer may split a value."""
 
     def carried(self, stream: Bytes, answer: bytes, now: float) -> Bytes:
-        """Bytes that reach the client: the values of `stream`, with `answer` inserted between two of them."""
+        """Bytes that reach the client under the present faults: the values of `stream`, with `answer` between two of
+        them.
+        """
         sent = self._with_answer(stream, answer)
         if now < self.silent_until:
             return sent[:0]
@@ -55,8 +57,8 @@ class Line:
         return sent
 
     def misread(self, sent: Bytes, baud: int, read_at: int) -> Bytes:
-        """Noise received by a client whose rate `read_at` differs from `baud`. It contains no hyphen, so that it never
-        resembles a prompt.
+        """Noise that a client receives if it reads at `read_at` baud bytes that were sent at `baud`. The noise contains
+        no hyphen, so that it never resembles a prompt.
         """
         noise = self._random.integers(0, 256, round(sent.size * min(1.0, read_at / baud)), dtype=np.uint8)
         return np.where(noise == _HYPHEN, np.uint8(0), noise)
@@ -81,10 +83,10 @@ class EmulatedLaser:
     """A sensor that measures `sight` with the errors of the simulated `laser`, on the serial port `port`.
 
     The constructor switches the sensor on; its line is served from `start()` on. `as_found` are the settings at
-    power-up, with which it does not stream by default. `clock_error` is the relative error of its clock, by default
-    that of `laser`. `rates` [1/s], `password` and `boot_time` [s] differ between versions of the sensor or are not
-    documented. Every method may be called from any thread. With `network`, the port is a socket, to which baud rates do
-    not apply.
+    power-up; with the default ones, the sensor does not stream. `clock_error` is the relative error of its clock, by
+    default that of `laser`. `rates` [1/s], `password` and `boot_time` [s] differ between versions of the sensor or are
+    not documented. Every method may be called from any thread. With `network`, the port is a socket, to which baud
+    rates do not apply.
 
     Raises DeviceNotFound on Windows, which has no pseudo-terminals, unless `network` is set.
     """
@@ -198,18 +200,18 @@ class EmulatedLaser:
             self._line.splits_words = allowed
 
     def laser_off(self) -> None:
-        """Open the input that switches the laser on."""
+        """Switch the laser off, by opening its on/off input."""
         with self._lock:
             self._sensor.beam = False
 
     def laser_on(self) -> None:
-        """Close the input that switches the laser on."""
+        """Switch the laser on, by closing its on/off input."""
         with self._lock:
             self._sensor.beam = True
 
     def switch(self, times: NDArray[np.float64]) -> None:
-        """Open and close the input that switches the laser on, in turn, at ascending host times [s]; without times, it
-        remains closed.
+        """Open and close the laser's on/off input in turn at ascending host times [s]; without times, the input remains
+        closed and the laser on.
         """
         # without the lock: the device calls this while it holds locks for which the thread of the line may wait
         self._sensor.switching = times
@@ -235,7 +237,7 @@ class EmulatedLaser:
             time.sleep(_TURN)
 
     def _note_lateness(self, now: float) -> None:
-        """Record the time since the previous turn, and since the system accepted the last byte."""
+        """Update the longest delay from the time between two services of the line and the age of pending bytes."""
         if self._terminal.pending == 0:
             self._delivered = now
         self._lateness = max(self._lateness, now - self._served - _TURN, now - self._delivered)

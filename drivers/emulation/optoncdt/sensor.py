@@ -69,7 +69,9 @@ class Grid:
 
     @property
     def stamp_lag(self) -> float:
-        """Time since the last tick of the time stamp at each exposure [s]; a cycle is a whole number of ticks."""
+        """Time from the last tick of the time stamp to an exposure [s]. It is that of the first exposure at the present
+        rate, and the same for all if a cycle is a whole number of ticks, as at all rates except 8 kHz.
+        """
         ticks = (float(self.times(np.array([self.first]))[0]) - self.epoch.now) * self._pace * TICKS
         return (ticks - floor(ticks)) / TICKS
 
@@ -109,11 +111,11 @@ class Sensor:
         self.measuring_range = laser.measuring_range
         self.stored = as_found
         self.beam = True
-        """Whether the input that switches the laser on is tied to ground."""
+        """Whether the on/off input of the laser is closed, so that the laser is on."""
         self.switching = np.zeros(0)
-        """Ascending host times [s] at which the input that switches the laser on is opened and closed in turn."""
+        """Ascending host times [s] at which the on/off input of the laser is opened and closed in turn."""
         self.target: Fault | None = None
-        """Target that replaces the sight."""
+        """Fault that a substitute for the target causes; None while the target is `sight`."""
         self.boot(now)
 
     def boot(self, ready: float) -> None:

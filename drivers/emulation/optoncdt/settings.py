@@ -135,7 +135,7 @@ def _integer(field: str, allowed: Callable[[float], bool]) -> Command:
 
 
 def _measuring_rate(rates: tuple[float, ...]) -> Command:
-    """Command for the measuring rate, in kHz; permitted are `rates` [1/s]."""
+    """Command for the measuring rate, which it states in kHz; `rates` [1/s] are the permitted rates."""
 
     def change(settings: Settings, parameters: list[str]) -> Settings:
         if (rate := 1e3 * number(single(parameters), float)) not in rates:

@@ -6,9 +6,9 @@ from contextlib import suppress
 from drivers.emulation.optoncdt.dialogue import SerialLine
 
 _MOST = 4096
-"""Bytes per read."""
+"""Maximum number of bytes per read."""
 _BUFFER = 1 << 16
-"""The system's buffer for a client that does not read [bytes]; it may use twice as much."""
+"""Requested size of the system's send buffer for a client that does not read [bytes]; the system may double it."""
 
 
 class SocketLine(SerialLine):

@@ -37,7 +37,7 @@ from tests.drivers.daqmx.others import Another
         (
             {"rate": 251e3},
             "sample_rate",
-            "with 4 in use, the inputs of Dev1 (USB-6363) can be read at 250000/s at most",
+            "the inputs of Dev1 (USB-6363) can be read at 250000/s at most (inputs in use: 4)",
         ),
         ({"rate": 2.9e6}, "sample_rate", "has a maximum rate of 2.86e+06/s"),
         ({"rate": 0.0}, "sample_rate", "greater than 0"),

@@ -149,7 +149,7 @@ class TestAnAmplifierThatIsReadyOnlyWhenEnabled:
         self, session: DaqSession, contacts: Contacts, plant: Loopback
     ) -> None:
         contacts.levels[LINES["amplifier_ready"]] = False
-        with pytest.raises(RigError, match=r"amplifier ready not good 0\.3 s after the enable line was closed"):
+        with pytest.raises(RigError, match=r"open 0\.3 s after the enable line was closed: amplifier ready"):
             session.prepare()
         assert plant.ever_enabled
         eventually(lambda: is_safe(plant))

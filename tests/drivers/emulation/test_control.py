@@ -125,7 +125,7 @@ def test_a_command_that_waits_does_not_hold_up_others() -> None:
 
 def test_nobody_there_is_a_lost_connection(server: ControlServer) -> None:
     server.close()
-    with pytest.raises(ConnectionLost, match="handwork is refused: no connection"):
+    with pytest.raises(ConnectionLost, match="handwork failed: no connection"):
         ask(server.address, "handwork", work=OperatorTask.REMOVE_BLOCK.value, amount=None)
 
 

@@ -35,5 +35,5 @@ def test_the_simulated_sensor_has_the_same_output() -> None:
 
 def test_an_input_that_does_not_hold_all_distances_is_refused() -> None:
     require_input_range("hardware.laser_1.range", 10.0, 500.0)
-    with pytest.raises(InvalidInput, match=r"hardware.laser_1.range = 5.0 .* 10 V over 500 ohm.* 250 ohm at most"):
+    with pytest.raises(InvalidInput, match=r"hardware.laser_1.range = 5.0 .* 10 V across 500 ohm.* 250 ohm at most"):
         require_input_range("hardware.laser_1.range", 5.0, 500.0)

@@ -104,7 +104,7 @@ def test_a_fast_sensor_on_the_factorys_baud_rate_sends_its_counter_only() -> Non
         (
             replaced(OPENED, TRIGGER=b"TRIGGER E202 Access denied\r\n->"),
             CommandRefused,
-            "refused TRIGGER NONE: E202 Access denied; switch it to the professional user level",
+            "refused TRIGGER NONE: E202 Access denied; select the professional user level",
         ),
         (
             replaced(OPENED, OUTHOLD=b"E234 Wrong parameter\r\n->"),

@@ -72,7 +72,7 @@ def _named(channels: Sequence[N], request: _AboutChannel) -> N:
 
 
 class ChannelAttributeService(Service):
-    """GetChanAttribute..., SetChanAttribute..."""
+    """Calls GetChanAttribute... and SetChanAttribute..."""
 
     def GetChanAttributeDoubleArray(
         self, request: pb.GetChanAttributeDoubleArrayRequest, context: object
@@ -119,7 +119,7 @@ class ChannelAttributeService(Service):
         return delay if units == DigitalWidthUnits.SECONDS.value else delay * clock.rate
 
     def _filter(self, request: _AboutChannel) -> FilterDelay:
-        """Settings of the filter delay. Raises DaqmxFailure for a converter without properties for it."""
+        """Settings of the filter delay. Raises DaqmxFailure for a converter that does not report its delay."""
         channel = self._input(request)
         if channel.inputs.delta_sigma is None or not channel.inputs.delta_sigma.readable:
             raise unsupported(attribute_of(request))

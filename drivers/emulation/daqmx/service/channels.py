@@ -38,7 +38,7 @@ J = TypeVar("J", bound=Job)
 
 
 class ChannelService(Service):
-    """CreateAIVoltageChan, CreateAOVoltageChan, CreateDIChan, CreateDOChan, CreateCOPulseChanTime."""
+    """Calls CreateAIVoltageChan, CreateAOVoltageChan, CreateDIChan, CreateDOChan and CreateCOPulseChanTime."""
 
     def CreateAIVoltageChan(
         self, request: pb.CreateAIVoltageChanRequest, context: object

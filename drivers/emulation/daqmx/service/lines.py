@@ -22,7 +22,7 @@ from drivers.emulation.daqmx.watchdog import Watchdog
 
 
 class TaskService(Service):
-    """CreateTask, ClearTask, StartTask, StopTask, TaskControl, IsTaskDone, GetTaskAttribute..."""
+    """Calls CreateTask, ClearTask, StartTask, StopTask, TaskControl, IsTaskDone and GetTaskAttribute..."""
 
     def CreateTask(self, request: pb.CreateTaskRequest, context: object) -> pb.CreateTaskResponse:
         task, new = self.opened(request.session_name, request.initialization_behavior)
@@ -99,7 +99,7 @@ class TaskService(Service):
 
 
 class LineService(Service):
-    """WriteDigitalLines, ReadDigitalLines: one byte per line."""
+    """Calls WriteDigitalLines and ReadDigitalLines, with one byte per line."""
 
     def WriteDigitalLines(self, request: pb.WriteDigitalLinesRequest, context: object) -> pb.WriteDigitalLinesResponse:
         task = self._task(request)
@@ -136,8 +136,8 @@ class LineService(Service):
         return pb.ReadDigitalLinesResponse(read_array=levels, samps_per_chan_read=1, num_bytes_per_samp=width)
 
     def _looked_at(self, task: Task, job: DigitalInput) -> bytes:
-        """The present levels. A task that was not started is started and stopped again (NI-DAQmx help, "Start
-        Task").
+        """The present levels. A task that is not running is started for the read and stopped again (NI-DAQmx help,
+        "Start Task").
         """
         started = task.state.started
         if not started:
@@ -153,7 +153,7 @@ _LEVELS = {Level.HIGH.value: True, Level.LOW.value: False}
 
 
 class WatchdogService(TaskService):
-    """CreateWatchdogTimerTaskEx, CfgWatchdog...ExpirStates, ControlWatchdogTask, GetWatchdogAttribute..."""
+    """Calls CreateWatchdogTimerTaskEx, CfgWatchdog...ExpirStates, ControlWatchdogTask, GetWatchdogAttribute..."""
 
     def CreateWatchdogTimerTaskEx(
         self, request: pb.CreateWatchdogTimerTaskExRequest, context: object

@@ -26,7 +26,7 @@ _VERSION: Mapping[int, int] = {
     pb.SYSTEM_ATTRIBUTE_NIDAQ_MINOR_VERSION: 8,
     pb.SYSTEM_ATTRIBUTE_NIDAQ_UPDATE_VERSION: 0,
 }
-"""The reported version, the oldest still in common use: clients must not need newer functions."""
+"""Reported version of the driver: the oldest one in common use, because clients must not require newer functions."""
 
 
 def _inputs(device: DeviceModel, attribute: int) -> AnalogInputs:
@@ -88,7 +88,9 @@ _CHASSIS: Mapping[int, ProductCategory] = {
 
 
 class SystemService(Service):
-    """GetSystemInfoAttribute..., GetDeviceAttribute..., GetPhysicalChanAttribute..., ResetDevice, GetErrorString."""
+    """Calls GetSystemInfoAttribute..., GetDeviceAttribute..., GetPhysicalChanAttribute..., ResetDevice and
+    GetErrorString.
+    """
 
     def GetSystemInfoAttributeUInt32(
         self, request: pb.GetSystemInfoAttributeUInt32Request, context: object
@@ -159,7 +161,7 @@ class SystemService(Service):
             return pb.GetErrorStringResponse(error_string="")
 
     def _chassis(self, request: _AboutDevice, attribute: int) -> str:
-        """The chassis of a module. Raises DaqmxFailure if it is not of the category of `attribute`."""
+        """The chassis of a module. Raises DaqmxFailure if `attribute` requests another kind of chassis."""
         device = self._driver.catalogue.device(request.device_name)
         if device.chassis is None or self._driver.catalogue.device(device.chassis).category != _CHASSIS[attribute]:
             raise unsupported(attribute)

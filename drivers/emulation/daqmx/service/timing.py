@@ -25,7 +25,7 @@ def _sampled(task: Task) -> Sampled:
 
 
 def _conversion_rate(job: Sampled, device: str) -> float:
-    """Conversions of a multiplexed device per second. Raises DaqmxFailure for devices without a multiplexer."""
+    """Conversion rate of a multiplexed device [1/s]. Raises DaqmxFailure for devices without a multiplexer."""
     period = job.conversion(device) if isinstance(job, AnalogInput) else None
     if period is None:
         raise unsupported(pb.TIMING_ATTRIBUTE_AI_CONV_RATE)
@@ -33,8 +33,8 @@ def _conversion_rate(job: Sampled, device: str) -> float:
 
 
 class TimingService(Service):
-    """CfgSampClkTiming, CfgImplicitTiming, CfgDigEdgeStartTrig, DisableStartTrig; attributes of timing, triggers and
-    buffers.
+    """Calls CfgSampClkTiming, CfgImplicitTiming, CfgDigEdgeStartTrig and DisableStartTrig, and those for attributes of
+    timing, triggers and buffers.
     """
 
     def CfgSampClkTiming(self, request: pb.CfgSampClkTimingRequest, context: object) -> pb.CfgSampClkTimingResponse:
