@@ -189,7 +189,7 @@ def _require_one_direction(daq: Daq, used: Mapping[str, FoundDevice]) -> None:
 
 def _require_known(item: str, given: str, known: Sequence[str], kind: str, device: FoundDevice) -> None:
     if given.strip("/").lower() not in (name.lower() for name in known):
-        there = f"it has {known[0]} to {known[-1]}" if known else "it has none"
+        there = f"it has {' to '.join(dict.fromkeys((known[0], known[-1])))}" if known else "it has none"
         raise InvalidInput(item, given, f"{device.name} ({device.product}) has no such {kind}; {there}")
 
 

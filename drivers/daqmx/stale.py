@@ -10,7 +10,7 @@ from contextlib import ExitStack
 from nidaqmx.errors import DaqError, RpcError
 
 from drivers.clock import WallClock
-from drivers.daqmx import inputs, library, output
+from drivers.daqmx import inputs, library, marker, output
 from drivers.daqmx.connection import Connection
 from drivers.daqmx.errors import status_of, translated
 from drivers.daqmx.safety import (
@@ -21,7 +21,7 @@ from drivers.daqmx.safety import (
 )
 from drivers.errors import DeviceNotFound
 
-_OURS = (ENABLE_TASK, HEARTBEAT_TASK, output.NAME, inputs.NAME, SAFETY_TASK, WATCHDOG_TASK)
+_OURS = (ENABLE_TASK, HEARTBEAT_TASK, output.NAME, inputs.NAME, SAFETY_TASK, WATCHDOG_TASK, marker.NAME)
 
 _WATCH = 0.6
 """Time for which a running output is observed [s]; an active client writes once per block, which lasts 0.1 s by default

@@ -12,6 +12,7 @@ from drivers.daqmx.session import DaqSession
 from drivers.emulation.daqmx.models import x_series
 from drivers.emulation.daqmx.server import DaqServer
 from drivers.errors import RigError
+from drivers.timebase.marking import Pulses
 from sim.sensors import Converter
 from tests.drivers.daqmx.loopback import BITS, RANGE, Loopback
 from tests.patience import eventually
@@ -41,9 +42,14 @@ def open_session(server: DaqServer) -> Iterator[OpenSession]:
     with ExitStack() as opened:
 
         def open_session(
-            *, inputs: tuple[AnalogInput, ...] = INPUTS, rate: float = RATE, lead: int = LEAD, **daq: Any
+            *,
+            inputs: tuple[AnalogInput, ...] = INPUTS,
+            rate: float = RATE,
+            lead: int = LEAD,
+            pulses: Pulses | None = None,
+            **daq: Any,
         ) -> DaqSession:
-            session = DaqSession(Daq(**{"server": server.address} | daq), inputs, rate, lead)
+            session = DaqSession(Daq(**{"server": server.address} | daq), inputs, rate, lead, pulses)
             opened.callback(closed_whatever_it_says, session)
             return session
 

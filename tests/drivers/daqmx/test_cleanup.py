@@ -9,6 +9,7 @@ import pytest
 from drivers.daqmx.session import DaqSession
 from drivers.emulation.daqmx.server import DaqServer
 from drivers.errors import ConnectionLost, DeviceNotFound, RigError
+from drivers.timebase.marking import golden_pulses
 from tests.drivers.daqmx.conftest import RATE, OpenSession
 from tests.drivers.daqmx.loopback import Loopback
 from tests.drivers.daqmx.runs import BLOCK, driving, is_safe, started
@@ -28,7 +29,7 @@ def doomed(server: DaqServer) -> Iterator[Wire]:
 def test_what_a_dead_client_left_is_cleared(
     open_session: OpenSession, plant: Loopback, doomed: Wire, playing: bool
 ) -> None:
-    dead = open_session(server=doomed.address)
+    dead = open_session(server=doomed.address, laser_marker="Dev1/ctr0", pulses=golden_pulses(4000.0))
     if playing:
         driving(dead)
     else:
@@ -37,7 +38,7 @@ def test_what_a_dead_client_left_is_cleared(
     assert plant.enabled
     session = open_session()
     left = session.description["tasks left by another client"]
-    assert left == "rockbench_enable, rockbench_out, rockbench_in"
+    assert left == "rockbench_enable, rockbench_out, rockbench_in, rockbench_marker"
     eventually(lambda: is_safe(plant))
     assert len(started(session).read(BLOCK)) == BLOCK
 
