@@ -43,7 +43,7 @@ class Reading:
 
 
 def refuse_choice(text: RecordText, choices: Choices, *names: str) -> None:
-    """Raise InvalidInput if one of the choices `names` ("channel", "column") is set, since the file's format has none."""
+    """Raise InvalidInput if a choice of `names` ("channel", "column") is set, because the file's format has none."""
     remedies = {
         "channel": "this format has no channels",
         "column": "a column can be selected only in a file of plain columns",

@@ -94,7 +94,7 @@ def _comments(text: RecordText) -> int:
 
 
 def _first_row(text: RecordText) -> int | None:
-    """Line index of the first row of numbers, separated from the comments by at most one line; None if there is none."""
+    """Line index of the first row of numbers, at most one line below the comments; None if there is none."""
     row = re.compile(rf"\s*{NUMBER}(?:[\s,;]+{NUMBER})*[\s,;]*")
     start = _comments(text)
     return next((k for k in range(start, min(start + 2, len(text.lines))) if row.fullmatch(text.lines[k])), None)

@@ -51,7 +51,7 @@ def read(text: RecordText, choices: Choices) -> Reading:
     if not 0.0 < rate < _UNKNOWN:
         raise text.refusal(
             _INTEGERS,
-            "the second number, the sampling rate, is unknown, so that the step may vary; use a record with a constant step",
+            "the second number, the sampling rate, is unknown: the step may vary; use a record with a constant step",
         )
     samples = numbers(text, first, len(text.lines), count, _WIDTH)
     known = [k for k in (29, 31) if abs(reals.values[k]) < _UNKNOWN]
@@ -79,6 +79,6 @@ def _comments(text: RecordText) -> int:
 
 
 def _field(text: RecordText, first: int, number: int) -> str:
-    """Text of integer `number`, counted from 1, in the block that begins at line index `first` and has eight per line."""
+    """Text of integer `number`, counted from 1, in the block that begins at line index `first`, eight per line."""
     row, column = divmod(number - 1, 8)
     return text.lines[first + row][_WIDTH * column : _WIDTH * (column + 1)]

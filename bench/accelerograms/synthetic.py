@@ -171,7 +171,7 @@ def synthetic_record(name: str, seed: int = DEFAULT_SEED) -> Accelerogram:
 
 
 def _motion(shape: Shape, seed: int, member: int) -> Array:
-    """The motion with the noise scaled so that noise and pulse together have the declared peak."""
+    """Acceleration [m/s2]: the noise is scaled so that noise and pulse together have the declared peak."""
     from scipy.optimize import brentq
 
     rate = SIGNIFICANT / shape.significant
@@ -192,7 +192,7 @@ def _motion(shape: Shape, seed: int, member: int) -> Array:
 
 
 def pulse_acceleration(pulse: Pulse, time: Array) -> Array:
-    """Acceleration [m/s2] of the pulse at `time` [s] from its middle, same shape.
+    """Acceleration [m/s2] of the pulse at `time` [s], counted from its middle; same shape as `time`.
 
     v = V/2 (1 + cos(2 pi t / (gamma T))) cos(2 pi t / T + nu) for |t| < gamma T / 2; for integer gamma above
     1 the residual displacement is zero. Source: Mavroeidis and Papageorgiou, Bull. Seism. Soc. Am. 93, 2003.

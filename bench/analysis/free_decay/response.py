@@ -1,7 +1,7 @@
 """Exact linear response of the frame on a moving table, in closed form in modal coordinates.
 
-With z the absolute displacements of the storeys and x that of the table, the lower springs and dashpots act on the
-motion relative to the table:
+With z the absolute displacements of the storeys and x that of the table, the lower spring k_1 and dashpot c_1 act on
+the motion relative to the table:
 
     M z'' + C z' + K z = (k_1 x + c_1 x', 0)
 
