@@ -1,4 +1,4 @@
-"""Calibration of the two lasers and of the table's sensors against them, and its application to readings.
+"""Calibration of the two lasers and, against the lasers, of the table's sensors; correction of laser readings.
 
 A laser's error is a Chebyshev polynomial in its reading over the covered readings, and constant beyond them. The
 table's sensors have one factor each: true = factor times reading.
@@ -81,11 +81,11 @@ class LaserCalibration(Parameters):
 
     @property
     def expires(self) -> datetime:
-        """End of validity."""
+        """Date and time at which the calibration ceases to be valid."""
         return self.date + timedelta(days=self.valid_days)
 
     def expired(self, now: datetime) -> str | None:
-        """Warning if the calibration has expired by `now`, which must have a time zone; None while it is valid."""
+        """Warning if the calibration has expired at `now`, which must have a time zone; None while it is valid."""
         if now <= self.expires:
             return None
         return (

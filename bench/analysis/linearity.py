@@ -43,8 +43,8 @@ ZETA_3 = 1.2020569
 """zeta(3), the sum of 1 / m^3 over m = 1, 2, ..."""
 
 CAUTION = 0.3
-"""Factor on the logarithm of the evidence, below 1 because a true curve is not a draw from the process, and because the
-harmonics of a small swing hardly determine the number of waves.
+"""Factor applied to the logarithm of the evidence. It is below 1 because a true curve is not a draw from the process,
+and because the harmonics of a small swing hardly determine the number of waves.
 """
 
 LEAST = 1e-5
@@ -53,7 +53,7 @@ evaluated.
 """
 
 ROUNDING = 1e-12
-"""Smallest fraction of a variance that is not due to rounding."""
+"""Fraction of a variance below which a remainder is due to rounding."""
 
 
 @dataclass(frozen=True, eq=False)

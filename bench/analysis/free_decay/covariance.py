@@ -41,7 +41,7 @@ PHASES = 8
 
 
 def waves(fit: Fit, size: float, ranges: tuple[float, float]) -> Array:
-    """Linearity errors [m] of each laser for every number of periods and both quadrature components, shape (m, 2, n)."""
+    """Linearity errors [m] of each laser for all numbers of periods and both quadrature components, shape (m, 2, n)."""
     seen = fit.fitted
     errors: list[Array] = []
     # the phase is uniformly distributed, so each quadrature component has half the power

@@ -193,8 +193,8 @@ def _from_points(swings: Swings, points: Points, alpha: float, p: float) -> Arra
     known = np.isfinite(points.impacts) & np.isfinite(points.amplitudes)
     count = known.size if known.all() else int(np.argmin(known))
     if count < FEWEST:
-        few = f"{count} impacts are large enough, but {FEWEST} are required"
-        raise NotRocking(f"{few}: tilt the block farther, or mount the laser higher")
+        few = f"number of sufficiently large impacts: {count}, at least {FEWEST} required"
+        raise NotRocking(f"{few}; tilt the block farther, or mount the laser higher")
     instants, sizes = points.impacts[:count], np.abs(points.amplitudes[:count])
     side = float(np.sign(swings.held))
     left = np.log(energy(np.minimum(sizes, 0.99 * alpha), alpha))
