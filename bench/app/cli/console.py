@@ -93,7 +93,9 @@ class LiveConsole:
         live.update(picture, refresh=True)
 
     def _print_grave(self) -> None:
-        """Print the lines that remain on the terminal after the display has been removed."""
+        """Print the notices that need the operator's attention; they remain on the terminal after the display has
+        closed.
+        """
         while self._grave:
             self._console.print(log_line(self._grave.popleft()))
 
