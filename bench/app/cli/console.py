@@ -56,7 +56,7 @@ class LiveConsole:
             self._hide()
 
     def prepare(self, phase: str, done: int = 0, total: int = 0, /) -> None:
-        """A `bench.progress.Progress` for the stages before the rig is opened and after it is closed."""
+        """Callback (`bench.progress.Progress`) for the stages before the rig is opened and after it is closed."""
         with self._lock:
             self._scene.prepare(phase, done, total)
         if self._live is None:
@@ -180,7 +180,7 @@ def _points(scene: RunDisplay, room: int, wide: bool) -> Table:
         effort = [row.effort] if wide else []
         table.add_row(row.omega, row.beta, row.alpha_2, row.predicted, row.difference, *words, *effort)
     if len(shown) < len(rows):
-        table.title = f"after {len(rows) - len(shown)} earlier points"
+        table.title = f"earlier points not shown: {len(rows) - len(shown)}"
         table.title_justify = "left"
     return table
 

@@ -185,7 +185,7 @@ COMMANDS = {
 
 
 def rockbench_app(arguments: Sequence[str] = ()) -> App:
-    """The command tree. Loads only the command, or the list of protocols, that `arguments` name."""
+    """The command tree. Of the commands, only the one that `arguments` name is loaded, or the list of protocols."""
     app = App(
         name="rockbench",
         help=SUMMARY,
@@ -248,7 +248,7 @@ def _version() -> str:
 
 
 def _document(command: App) -> None:
-    """Replace the summary of a command by its documentation, one line per paragraph, which the terminal wraps."""
+    """Replace the summary of a command by its full help, with one line per paragraph, which the terminal wraps."""
     text = getdoc(command.default_command) or ""
     command.help = "\n\n".join(" ".join(paragraph.split()) for paragraph in text.split("\n\n"))
 
