@@ -12,7 +12,7 @@ from bench.accelerograms.text import RecordText
 Array = NDArray[np.float64]
 
 NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[EeDd][+-]?\d+)?"
-"""A decimal number in Fortran or C format, excluding NaN and infinity."""
+"""Pattern of a decimal number in Fortran or C format, without NaN and infinity."""
 
 _FOREIGN = re.compile(r"[^0-9EeDd+\-.\s]")
 

@@ -51,7 +51,7 @@ _TOP = 0.4
 _NOISE_BAND = (2.0, 60.0)
 """Frequencies [Hz] between which the sensors' noise is assumed white."""
 _PASSING = 0.05
-"""Interval [s] in which a sensor's resolution steps are counted; it is a fraction of the relevant periods."""
+"""Interval [s] in which a sensor's resolution steps are counted; it is shorter than the relevant periods."""
 _CLEAR = 100.0
 """Ratio of power to noise above which a sensor measures the motion."""
 ALIKE = 0.02

@@ -76,7 +76,7 @@ OWN, COMMON = ("noise", "table", "clock"), ("linearity", "masses", "timebase")
 """Sources that are independent between decays, and sources common to all decays."""
 
 _RATES = np.array([2.0, 2.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0])
-"""Exponents of the sample rate in the quantities of `response.NAMES`."""
+"""Exponents with which the sample rate enters the quantities of `response.NAMES`."""
 
 SEGMENT = 4.0
 """Duration of the segments for the spectrum of the residual [s]."""

@@ -133,7 +133,7 @@ class Fit:
 
     @property
     def response(self) -> Response:
-        """The model's response at the samples of the section."""
+        """Modal response of the identified frame, for the sample interval of the section."""
         return response(self.constants, self.stretch.step)
 
     def moved(self, error: Array) -> Array:

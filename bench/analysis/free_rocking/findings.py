@@ -140,7 +140,7 @@ class LaserErrors:
 
 
 def _middles(low: float, high: float, count: int) -> Array:
-    """The midpoints of `count` equal parts of a range."""
+    """The midpoints of `count` equal parts of the range from `low` to `high`, shape (count,)."""
     return low + (high - low) * (np.arange(count) + 0.5) / count
 
 

@@ -28,7 +28,7 @@ NAMES = ("alpha", "p", "restitution", "share", "start", "zero", "bend_2", "bend_
 ALPHA, P, R, SHARE, START, ZERO, BEND_2, BEND_3 = range(len(NAMES))
 
 FREE = 0.9
-"""Fraction of the held tilt below which the block counts as released."""
+"""Fraction of the initial tilt below which the block counts as released."""
 
 FEWEST = 12
 """Minimum number of impacts for a fit."""

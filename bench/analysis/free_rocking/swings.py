@@ -21,7 +21,7 @@ STILL = 2e-4
 """Largest standard deviation [m] of the displacement at rest, due to the resolution and noise of a laser."""
 
 _HELD = 0.5
-"""Time at the beginning of a recording over which the held tilt is averaged [s]."""
+"""Duration at the beginning of a recording over which the initial tilt is averaged [s]."""
 
 _SHARE = 0.25
 """Fraction of the smallest usable angle that a sample must exceed to count as a tilt to one side."""

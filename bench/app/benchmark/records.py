@@ -1,4 +1,4 @@
-"""Benchmarks of gain maps, computed from periodic orbits and from runs of 120 s, and of sampled records.
+"""Benchmarks of gain maps (from periodic orbits, and from runs of 120 s) and of motions under sampled records.
 
 There are three cases of records: a block that stays at rest, one that rocks throughout, and an ensemble with scattered
 parameters.

@@ -89,7 +89,7 @@ def emulate(
     ] = None,
     progress: Handed = silent,
 ) -> int:
-    """Serve an emulated laboratory: the virtual bench in real time behind the instruments' real protocols.
+    """Serve an emulated laboratory: the virtual bench in real time, accessed through the instruments' protocols.
 
     Prints the configuration of a client, or writes it with --write, then serves the laboratory until Ctrl-C. Serial
     lasers need pseudo-terminals, which exist on Linux and macOS only; use --lasers socket elsewhere.

@@ -35,7 +35,7 @@ def info(file: CampaignFile, /, *, as_json: Json = False, progress: Handed = sil
 
 
 def verify(file: CampaignFile, /, *, as_json: Json = False, progress: Handed = silent) -> int:
-    """Compare every dataset of a data file with its checksum and with the layout.
+    """Check every dataset of a data file against its checksum and against the file layout.
 
     The exit code is 0 if the file is complete and unchanged, 2 if it is damaged or refused.
     """

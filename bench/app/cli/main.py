@@ -61,7 +61,7 @@ COMMANDS = {
     ),
     "emulate": (
         "emulate:emulate",
-        "Serve an emulated laboratory: the virtual bench in real time behind the instruments' real protocols.",
+        "Serve an emulated laboratory: the virtual bench in real time, accessed through the instruments' protocols.",
         "--write lab.toml",
     ),
     "predict modes": (
@@ -132,7 +132,7 @@ COMMANDS = {
     ),
     "file verify": (
         "file:verify",
-        "Compare every dataset of a data file with its checksum and with the layout.",
+        "Check every dataset of a data file against its checksum and against the file layout.",
         "campaign.h5 --json",
     ),
     "file recover": (
