@@ -43,5 +43,5 @@ class Accelerogram:
 
     @property
     def sampled(self) -> SampledRecord:
-        """The record as an excitation of the model."""
+        """The record as a base excitation of the model."""
         return SampledRecord(self.acceleration, self.dt)

@@ -13,8 +13,8 @@ from sim.errors import InvalidInput
 def check_peak(text: RecordText, index: int, stated: str, samples: Samples, resolution: float | None = None) -> None:
     """Check the largest magnitude of the samples against the value stated in line `index`, in the samples' unit.
 
-    The tolerance is one unit in the last digit of each value; `resolution`, in the samples' unit, replaces that digit
-    of the samples if they were written in another unit. Raises InvalidInput.
+    The tolerance is one unit in the last digit of each value; `resolution`, in the samples' unit, replaces the unit in
+    the samples' last digit if they were written in another unit. Raises InvalidInput.
     """
     at = int(np.abs(samples.values).argmax())
     found = abs(float(samples.values[at]))

@@ -41,8 +41,8 @@ SMALL = 0.15
 """Largest deviation of the peaks, half their range relative to their mean, for which the orbit's peak is reported."""
 
 SHORTEST, SINGULAR, STEP = 24, 1e8, 1e-6
-"""Limits and step of the computation of a rate: smallest number of changes, largest condition number of the equations,
-and step of the finite differences.
+"""Settings for the computation of a rate: smallest number of changes, largest condition number of the equations, and
+step of the finite differences.
 """
 
 

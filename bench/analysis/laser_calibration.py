@@ -35,9 +35,7 @@ class LaserCurve(Parameters):
     uncertainty: float = quantity(
         ..., "m", "standard uncertainty of the laser's error at one reading", ge=0, usual=(1e-6, 1e-3)
     )
-    scale: float = quantity(
-        ..., "1", "relative span of the laser's readings, normalised to a mean of 1 over both lasers"
-    )
+    scale: float = quantity(..., "1", "span of the laser's readings, relative to the mean span of both lasers")
     delay: float = quantity(..., "s", "delay relative to the table's displacement sensor", usual=(1e-5, 0.05))
     delay_uncertainty: float = quantity(..., "s", "standard uncertainty of the delay", ge=0, usual=(1e-7, 1e-3))
 

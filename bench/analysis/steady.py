@@ -112,8 +112,8 @@ class SteadyDetector:
         these: NDArray[np.complex128] | NDArray[np.float64],
         those: NDArray[np.complex128] | NDArray[np.float64],
     ) -> NDArray[np.float64]:
-        """Distance between amplitudes: the difference in magnitude or, if larger, that in phase beyond the jitter,
-        times the magnitude.
+        """Distance between amplitudes: the larger of the difference in magnitude and the phase difference beyond the
+        jitter [rad], multiplied by the magnitude.
         """
         size = np.abs(those)
         turned = np.abs(np.angle(these * np.conj(those))) * size

@@ -76,7 +76,7 @@ class BaseMotion:
 
     @property
     def record(self) -> SampledRecord:
-        """The motion as an excitation of the model."""
+        """The motion as a base excitation of the model."""
         return SampledRecord(self.acceleration, self.dt)
 
     @property

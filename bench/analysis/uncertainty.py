@@ -135,7 +135,7 @@ class Budget:
 
     @property
     def as_json(self) -> str:
-        """All contributions as JSON, largest first."""
+        """All contributions as JSON, largest first, with three significant digits."""
         return json.dumps({name: float(f"{value:.3g}") for name, value in self.largest_first.items()})
 
     @property

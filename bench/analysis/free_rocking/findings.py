@@ -1,5 +1,5 @@
 """Results of several tilts with their uncertainties: restitution, its trend, critical angle, frequency parameter. The
-contributions of the laser are:
+errors of the laser are modelled as follows.
 
 Linearity: a smooth error, size sin(2 pi n x / range + phase), with `size` from the data sheet, and with uniformly
 distributed phase and number n of periods within the measuring range; it is common to all tilts. The fitted curvature

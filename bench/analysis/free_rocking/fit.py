@@ -182,7 +182,7 @@ def _block_means(samples: Array, size: int) -> Array:
 
 def _bounds(alpha: float, p: float) -> tuple[Array, Array]:
     """Lower and upper bounds of the values: alpha and p within a factor of two of those from the geometry, r and the
-    ratio of tilt to alpha where a motion exists, and the others wide.
+    ratio of tilt to alpha within the range in which a motion exists; the other bounds are wide.
     """
     lowest = np.array([0.5 * alpha, 0.5 * p, 0.05, 1e-3, -1e4, -1.0, -10.0, -1e3])
     return lowest, np.array([2.0 * alpha, 2.0 * p, 0.9999, 0.999, 1e4, 1.0, 10.0, 1e3])

@@ -1,4 +1,4 @@
-"""Benchmark of commands for which a person waits: elapsed time, processor time and memory of each, in a separate
+"""Benchmark of commands whose result a user waits for: elapsed time, processor time and memory of each, in its own
 process.
 """
 
@@ -30,7 +30,7 @@ class Waited:
 
     line : arguments of the command.
     limit : maximum time [s].
-    of : the time to which `limit` applies, elapsed or processor time.
+    of : key of the time to which `limit` applies: elapsed or processor time.
     memory : maximum memory [MB]; None for no limit.
     quick : whether the quick benchmark includes the command.
     """

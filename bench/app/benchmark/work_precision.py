@@ -293,7 +293,7 @@ def _targets(rows: list[dict[str, Cell]]) -> list[Target]:
             "1",
         ),
         Target(
-            "time with peaks relative to scipy DOP853, Python (1e-10) without peaks",
+            "time with peaks relative to scipy DOP853 (1e-10) with equations in Python, without peaks",
             1 / 400,
             share("scipy DOP853, Python", "rtol 1e-10"),
             "1",

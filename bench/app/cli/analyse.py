@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from bench.replay.session import Replayed
 
 HEADLINES = ("status", "alpha_2", "alpha_2_uncertainty", "alpha_2_predicted", "agrees")
-"""Fields that are printed if a protocol has them; the file contains all fields."""
+"""Main results of a point, which are printed if the protocol has them; the file contains all fields."""
 
 WIDEST = 44
 """Maximum length of a printed value or label [characters]."""

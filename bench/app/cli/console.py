@@ -1,4 +1,4 @@
-"""The run display on a terminal. No state is shown by colour alone: each one also has a word."""
+"""The run display on a terminal. No state is shown by colour alone: a word also names it."""
 
 import threading
 from collections import deque
