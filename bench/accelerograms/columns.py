@@ -133,7 +133,9 @@ def _parsed(text: RecordText, first: int, separator: str | None) -> Array:
         if not line.strip():
             raise text.refusal(index, "it is empty but more samples follow: the record has a gap")
         if len(cells) != width:
-            raise text.refusal(index, f"it has {len(cells)} columns, but the lines above have {width}")
+            raise text.refusal(
+                index, f"its number of columns, {len(cells)}, differs from that of the lines above, {width}"
+            )
         for cell in cells:
             if re.fullmatch(NUMBER, cell.strip()) is None or not np.isfinite(value_of(cell.strip())):
                 raise text.refusal(index, f"{cell.strip()!r} is not a finite decimal number")

@@ -48,7 +48,7 @@ def numbers(text: RecordText, first: int, last: int, count: int, width: int | No
     _refuse_junk(text, first, lines, width)
     there = sum(len(re.findall(NUMBER, line)) for line in lines)
     cause = "the file is truncated: download it again" if there < count else "the file is damaged or numbers were added"
-    allowed = f"the header states {count} samples, but there are {there} numbers up to this line; {cause}"
+    allowed = f"number of samples in the header: {count}, numbers up to this line: {there}; {cause}"
     raise text.refusal(first + max(len(lines) - 1, 0), allowed)
 
 

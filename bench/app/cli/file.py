@@ -192,8 +192,8 @@ def _campaign(content: dict[str, Any]) -> dict[str, Any]:
         "plan": content["plan_hash"],
         "samples": f"{content['samples']} at {content['sample_rate']:g} samples/s: {content['duration']:.1f} s"
         f"; runs: {len(content['runs'])}",
-        "points": f"{content['points']}; {content['events']} events",
-        "tables": ", ".join(f"{name} ({rows} rows)" for name, rows in content["tables"].items()),
+        "points": f"{content['points']}; events: {content['events']}",
+        "tables": ", ".join(f"{name} (rows: {rows})" for name, rows in content["tables"].items()),
         "checksums": _checksums(content),
         "recovered": "; ".join(content["recovered"]),
     }
@@ -216,6 +216,6 @@ def _checksums(content: dict[str, Any]) -> str:
     if not content["checksums"]:
         return "none"
     left = content.get("unchecked", 0)
-    wrong = f"{len(content['failing'])} differ" if content["failing"] else "those verified are intact"
+    wrong = f"differing: {len(content['failing'])}" if content["failing"] else "those verified are intact"
     rest = f"; {left} not verified, see `rockbench file verify`" if left else ""
-    return f"{content['checksums']} datasets; {wrong}{rest}"
+    return f"datasets: {content['checksums']}; {wrong}{rest}"
