@@ -1,4 +1,4 @@
-"""`python -m bench`: runs the command `rockbench` if its script is not on the path."""
+"""Runs the command `rockbench` as `python -m bench`, for use where its script is not on the path."""
 
 from bench.app.cli.process import run
 

@@ -1,1 +1,1 @@
-"""Earthquake records: readers for all common file formats, intensity measures, synthetic records."""
+"""Earthquake records: readers for the common file formats, intensity measures and synthetic records."""

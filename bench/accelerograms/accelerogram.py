@@ -15,10 +15,10 @@ Array = NDArray[np.float64]
 class Accelerogram:
     """Ground acceleration [m/s2], shape (n,), at a constant step `dt` [s].
 
-    It is not filtered, scaled or shifted, except that the offset of K-NET's recorders is removed; `header` then states
-    this offset. `name` is a short name for tables and legends. `source` is the path of the file, or a note that the
-    motion is synthetic; `format` is the file format, `unit` the unit in the file, `sha256` the hash of the file's bytes
-    (of the samples for a synthetic motion). `header` holds the source's header values by name.
+    The samples are not filtered, scaled or shifted, except that the offset of K-NET and KiK-net recorders is removed;
+    `header` then states this offset. `name` is a short name for tables and legends. `source` is the path of the file,
+    or a note that the motion is synthetic; `format` is the file format, `unit` the unit in the file, `sha256` the hash
+    of the file's bytes (of the samples for a synthetic motion). `header` holds the source's header values by name.
     """
 
     name: str
@@ -38,10 +38,10 @@ class Accelerogram:
 
     @property
     def peak(self) -> float:
-        """Largest magnitude [m/s2]."""
+        """Largest magnitude of the samples [m/s2]."""
         return float(np.abs(self.acceleration).max())
 
     @property
     def sampled(self) -> SampledRecord:
-        """The record as an excitation of the model."""
+        """The record as a base excitation of the model."""
         return SampledRecord(self.acceleration, self.dt)

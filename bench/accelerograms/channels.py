@@ -11,8 +11,8 @@ from sim.errors import InvalidInput
 
 @dataclass(frozen=True)
 class Channel:
-    """Channel of a file: its header begins at line `first`; its accelerations are in the lines after `data`, up to
-    `last` - 1.
+    """Channel of a file, by line indices: its header begins at `first`; its samples follow line `data` and end before
+    `last`.
     """
 
     number: int
@@ -23,7 +23,7 @@ class Channel:
 
 
 def chosen(text: RecordText, channels: Sequence[Channel], choices: Choices) -> Channel:
-    """The channel with the given number or name; by default the only one. Raises InvalidInput."""
+    """The channel selected by number or name, or the only one if none is selected. Raises InvalidInput."""
     offered = ", ".join(
         f"{channel.number} ({channel.name})" if channel.name else f"{channel.number}" for channel in channels
     )
@@ -37,7 +37,7 @@ def chosen(text: RecordText, channels: Sequence[Channel], choices: Choices) -> C
     if not found:
         found = [channel for channel in channels if _bare(channel.name) == _bare(wanted)]
     if len(found) != 1:
-        raise InvalidInput(item, wanted, f"the file has {offered}; select one by number")
+        raise InvalidInput(item, wanted, f"the channels of the file are {offered}; select one by number")
     return found[0]
 
 

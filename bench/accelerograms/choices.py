@@ -13,12 +13,12 @@ from bench.accelerograms.units import UNITS, unit_of
 from sim.errors import InvalidInput
 
 _SAME_STEP = 1e-6
-"""Relative difference up to which two steps written with different numbers of digits count as equal."""
+"""Relative difference up to which two time steps, written with different numbers of digits, count as equal."""
 
 
 @dataclass(frozen=True)
 class Choices:
-    """Step [s], unit, channel and column specified for a file; None where not specified."""
+    """Time step [s], unit, channel and column specified by the user for a file; None where not specified."""
 
     dt: float | None = None
     unit: str | None = None
@@ -43,7 +43,7 @@ class Reading:
 
 
 def refuse_choice(text: RecordText, choices: Choices, *names: str) -> None:
-    """Raise InvalidInput if a channel or column is chosen that the file does not have."""
+    """Raise InvalidInput if a choice of `names` ("channel", "column") is set, because the file's format has none."""
     remedies = {
         "channel": "this format has no channels",
         "column": "a column can be selected only in a file of plain columns",
@@ -55,15 +55,15 @@ def refuse_choice(text: RecordText, choices: Choices, *names: str) -> None:
 
 
 def combine(text: RecordText, choices: Choices, reading: Reading) -> Accelerogram:
-    """The record in m/s2. Raises InvalidInput where the user's choice and the file disagree, or neither states a
-    value.
+    """The accelerogram in m/s2. Raises InvalidInput if a choice contradicts the file, if neither states the step or the
+    unit, or if the samples are fewer than two, not all finite or all zero.
     """
     name = text.path.name
     dt = _step(name, choices.dt, reading.dt)
     unit = _unit(name, choices.unit, reading.unit)
     values = UNITS[unit] * reading.values
     if values.size < 2 or not np.isfinite(values).all():
-        raise InvalidInput("record", name, "it must have at least two finite samples")
+        raise InvalidInput("record", name, "it must have at least two samples, all of them finite")
     if not values.any():
         raise InvalidInput("record", name, "every sample is zero: it contains no motion")
     return Accelerogram(

@@ -26,7 +26,9 @@ _UNIT = re.compile(r"\b[cm]?m/s(?:ec)?(?:(?:\^|\*\*)?2\b|/s(?:ec)?\b)", re.IGNOR
 
 
 def check_comments(text: RecordText, count: int, choices: Choices) -> None:
-    """Check step and unit against the first `count` lines. Raises InvalidInput naming the line."""
+    """Compare the specified step and unit with those stated in the first `count` lines. Raises InvalidInput naming a
+    line that contradicts them.
+    """
     for index, line in enumerate(text.lines[:count]):
         step, unit = _STEP.search(line), _UNIT.search(line)
         if step is not None and choices.dt is not None and not isclose(value_of(step[1]), choices.dt, rel_tol=1e-6):
@@ -43,12 +45,12 @@ _RISING = 0.9
 """Fraction of rising steps above which the first column counts as time; its steps must then all be equal."""
 
 _EQUAL = 1e-6
-"""Relative allowance for rounding in the comparison of time steps."""
+"""Relative tolerance for rounding errors in the comparison of time steps."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Table:
-    """`values` has shape (rows, columns); `first` is the index of the line of its first row."""
+    """Columns of a file: `values` has shape (rows, columns); its first row is in the line with index `first`."""
 
     values: Array
     headings: list[str]
@@ -92,7 +94,7 @@ def _comments(text: RecordText) -> int:
 
 
 def _first_row(text: RecordText) -> int | None:
-    """Index of the first row of numbers, at most one line after the comments; None if there is none."""
+    """Line index of the first row of numbers, at most one line below the comments; None if there is none."""
     row = re.compile(rf"\s*{NUMBER}(?:[\s,;]+{NUMBER})*[\s,;]*")
     start = _comments(text)
     return next((k for k in range(start, min(start + 2, len(text.lines))) if row.fullmatch(text.lines[k])), None)
@@ -115,7 +117,7 @@ def _table(text: RecordText) -> _Table:
 
 
 def _parsed(text: RecordText, first: int, separator: str | None) -> Array:
-    """The rows, shape (rows, columns). Raises InvalidInput naming the first line with a different format."""
+    """The numbers, shape (rows, columns). Raises InvalidInput naming the first line that cannot be read."""
     lines = text.lines[first:]
     try:
         if "" not in lines:
@@ -131,7 +133,9 @@ def _parsed(text: RecordText, first: int, separator: str | None) -> Array:
         if not line.strip():
             raise text.refusal(index, "it is empty but more samples follow: the record has a gap")
         if len(cells) != width:
-            raise text.refusal(index, f"it has {len(cells)} columns, but the lines above have {width}")
+            raise text.refusal(
+                index, f"its number of columns, {len(cells)}, differs from that of the lines above, {width}"
+            )
         for cell in cells:
             if re.fullmatch(NUMBER, cell.strip()) is None or not np.isfinite(value_of(cell.strip())):
                 raise text.refusal(index, f"{cell.strip()!r} is not a finite decimal number")
@@ -139,7 +143,7 @@ def _parsed(text: RecordText, first: int, separator: str | None) -> Array:
 
 
 def _is_time(values: Array) -> bool:
-    """Whether the first of several columns rises steadily, which times do and ground accelerations do not."""
+    """Whether the first of several columns rises steadily, as times do but ground accelerations do not."""
     if values.shape[1] < 2 or len(values) < 3:
         return False
     steps = np.diff(values[:, 0])
@@ -165,15 +169,15 @@ def _step(text: RecordText, table: _Table) -> float:
     drift = np.abs(time - time[0] - dt * np.arange(time.size))
     if wrong.size or drift.max() > max(rounding, _EQUAL * usual):
         at = int(wrong[0]) + 1 if wrong.size else int(drift.argmax())
-        problem = f"the step from the time above differs from the usual step, {usual:g} s"
+        problem = f"the step from the previous time differs from the usual step, {usual:g} s"
         raise text.refusal(table.first + at, f"{problem}: there is a gap, or the times have too few digits")
-    # the digits of the intended step: 0.01 instead of 0.00999999999
+    # restore the intended step: 0.01 instead of 0.00999999999
     meant = float(f"{dt:.9g}")
     return meant if abs(meant - dt) * steps.size <= digit else dt
 
 
 def _column(text: RecordText, choices: Choices, table: _Table, time: bool) -> int:
-    """The chosen column, counted from 0."""
+    """Index of the chosen column, from 0. Raises InvalidInput."""
     count = table.values.shape[1]
     names = [_heading(cell)[0] for cell in table.headings]
     offered = [f"{k + 1} ({names[k]})" if names else f"{k + 1}" for k in range(int(time), count)]

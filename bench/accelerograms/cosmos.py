@@ -1,7 +1,7 @@
 """COSMOS files, version 1.20 (`.V1c`, `.V2c`): text, integers, reals and comments, then one quantity of one channel.
 
-Each part states the number of lines or numbers that follow, and their columns. Real 34 is the time step. A file may
-contain several channels, with the velocity and displacement of each. Source: COSMOS Strong Motion Programs Board,
+Each part begins with the number of lines or values that follow and their format. Real 34 is the time step [s]. A file
+may contain several channels, with the velocity and displacement of each. Source: COSMOS Strong Motion Programs Board,
 "COSMOS strong motion data format", version 1.20, August 15, 2001.
 """
 
@@ -33,7 +33,9 @@ _STEP = 34
 
 
 class _Block(NamedTuple):
-    """Block of a file: its header begins at line `first`; its data are in the lines after `data`, up to `last` - 1."""
+    """Block of a file, by line indices: its header begins at `first`; its data follow line `data` and end before
+    `last`.
+    """
 
     first: int
     data: int
@@ -41,7 +43,7 @@ class _Block(NamedTuple):
 
 
 def recognise(text: RecordText) -> bool:
-    """Whether the first line states a COSMOS format."""
+    """Whether the first line states a COSMOS format and a header of reals follows."""
     return _START.search(text.lines[0]) is not None and any(_REALS.match(line) for line in text.lines)
 
 
@@ -83,7 +85,9 @@ def _step(text: RecordText, channel: Channel) -> float:
             if values.size >= _STEP and values[_STEP - 1] > 0.0:
                 return float(values[_STEP - 1])
             raise text.refusal(index, f"real number {_STEP}, the time step, is unknown")
-    raise text.refusal(channel.first, "the real numbers, with the time step, are missing; the file is damaged")
+    raise text.refusal(
+        channel.first, "the real numbers, which include the time step, are missing; download the file again"
+    )
 
 
 def _channels(text: RecordText) -> list[Channel]:

@@ -1,5 +1,5 @@
-"""CSMIP volume 2 files (`.V2`): for each channel 25 lines of text, integers and reals, then acceleration, velocity and
-displacement in eight columns of width 10 that may touch.
+"""CSMIP volume 2 files (`.V2`): for each channel 25 lines of text, headers of integers and reals, then acceleration,
+velocity and displacement in eight columns, usually 10 characters wide, that may touch.
 
 Source: California Strong Motion Instrumentation Program, "Standard tape format for CSMIP strong-motion data tapes",
 OSMS 85-03 (1985); its later releases state the column format, such as (8f10.6), next to the count.
@@ -60,7 +60,7 @@ def read(text: RecordText, choices: Choices) -> Reading:
 
 
 def _channels(text: RecordText) -> list[Channel]:
-    """All channels with their blocks of acceleration."""
+    """All channels, each with its block of accelerations. Raises InvalidInput."""
     starts = [(index, match) for index, line in enumerate(text.lines) if (match := _START.match(line)) is not None]
     ends = [index for index, _ in starts[1:]] + [len(text.lines)]
     found: list[Channel] = []

@@ -1,4 +1,4 @@
-"""ESM's and ITACA's `.ASC` files: `KEY: value` lines (64 in DYNA 1.2), then samples, one to a line.
+"""ESM's and ITACA's `.ASC` files: `KEY: value` lines (64 in DYNA 1.2), then one sample per line.
 
 AFAD's files have the same header. Source: ESM database, "ASCII DYNA 1.2 format"; Luzi et al. (2016).
 """

@@ -13,7 +13,7 @@ _COUNT, _STEP = "Number of Data", "Time Increment (s)"
 
 
 def recognise(text: RecordText) -> bool:
-    """Whether the file begins with the event's date and states the number of data."""
+    """Whether the file begins with the event's date and states the number of samples."""
     return text.lines[0].startswith("Event Date & Time") and _COUNT in _keys(text)
 
 

@@ -1,4 +1,4 @@
-"""Files of K-NET and KiK-net (`.NS`, `.EW1`, ...): 17 lines of header, then counts of the digitizer.
+"""Files of K-NET and KiK-net (`.NS`, `.EW1`, ...): 17 header lines, then the recorder's integer counts.
 
 A sample is its count times the scale factor, minus the mean of all samples: the recorders have an offset, and the peak
 in the header is relative to the mean. Source: NIED, "About K-NET ASCII format" and K-NET/KiK-net FAQ 2.

@@ -27,8 +27,9 @@ class Measures:
 
     `pga` [m/s2], `pgv` [m/s] and `pgd` [m] are the largest magnitudes, including those between samples;
     `final_velocity` [m/s] and `final_displacement` [m] are those at the last sample. `arias` [m/s] is the intensity of
-    Arias (1970), pi / (2 g) times the integral of a^2. `significant_5_75` and `significant_5_95` [s] are the durations
-    over which it grows from 5 to 75 and to 95 per cent (Trifunac and Brady, Bull. Seism. Soc. Am. 65, 1975).
+    Arias (1970), pi / (2 g) times the integral of a^2. `significant_5_75` and `significant_5_95` [s] are the times in
+    which it grows from 5 to 75 % and from 5 to 95 % of its final value (Trifunac and Brady, Bull. Seism. Soc. Am. 65,
+    1975).
     """
 
     pga: float
@@ -42,12 +43,12 @@ class Measures:
 
     @property
     def drifts(self) -> bool:
-        """Whether `pgv` and `pgd` are due to a baseline error rather than to the ground."""
+        """Whether `pgv` and `pgd` are due to a baseline error rather than to ground motion."""
         return abs(self.final_velocity) > DRIFTING * self.pgv
 
 
 def measures(record: Accelerogram) -> Measures:
-    """Intensity measures of a record."""
+    """Intensity measures of the record as it is, without baseline correction."""
     a, dt = record.acceleration, record.dt
     velocity, displacement = table_motion(a, dt)
     energy = husid(a, dt)
@@ -73,7 +74,7 @@ def husid(acceleration: Array, dt: float) -> Array:
 
 
 def _reached(energy: Array, share: float, dt: float) -> float:
-    """Time [s] at which a fraction of the energy is reached, interpolated between samples."""
+    """Time [s] at which `energy` reaches the fraction `share` of its final value, interpolated between samples."""
     level = share * float(energy[-1])
     k = int(np.searchsorted(energy, level))
     before, after = float(energy[k - 1]), float(energy[k])
@@ -81,7 +82,9 @@ def _reached(energy: Array, share: float, dt: float) -> float:
 
 
 def _peaks(velocity: Array, displacement: Array, acceleration: Array, dt: float) -> tuple[float, float]:
-    """Largest |v| and |d|, including extrema between samples, where velocity is a parabola and displacement a cubic."""
+    """Largest |velocity| [m/s] and |displacement| [m], including extrema between samples, where velocity is a parabola
+    and displacement a cubic.
+    """
     from scipy.interpolate import CubicHermiteSpline, PPoly
 
     time = dt * np.arange(velocity.size)

@@ -1,4 +1,4 @@
-"""Reading of a block of numbers, separated by blanks or, where they touch, by the column width."""
+"""Reader of a block of numbers that are separated by blanks or, where they touch, by the column width."""
 
 import re
 from collections.abc import Sequence
@@ -12,7 +12,7 @@ from bench.accelerograms.text import RecordText
 Array = NDArray[np.float64]
 
 NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[EeDd][+-]?\d+)?"
-"""A decimal number in Fortran or C format, excluding NaN and infinity."""
+"""Pattern of a decimal number in Fortran or C format, without NaN and infinity."""
 
 _FOREIGN = re.compile(r"[^0-9EeDd+\-.\s]")
 
@@ -29,7 +29,7 @@ def numbers(text: RecordText, first: int, last: int, count: int, width: int | No
     """The `count` numbers in the lines `first` to `last` - 1, with all rows but the last of equal length.
 
     `width` is the column width if the format fixes it; otherwise it is determined from the numbers. Raises InvalidInput
-    naming the line with unexpected content, or the count.
+    naming a line with unexpected content or a wrong count.
     """
     lines = [line.rstrip() for line in text.lines[first:last]]
     while lines and not lines[-1]:
@@ -48,7 +48,7 @@ def numbers(text: RecordText, first: int, last: int, count: int, width: int | No
     _refuse_junk(text, first, lines, width)
     there = sum(len(re.findall(NUMBER, line)) for line in lines)
     cause = "the file is truncated: download it again" if there < count else "the file is damaged or numbers were added"
-    allowed = f"the header states {count} samples, but there are {there} numbers before this line; {cause}"
+    allowed = f"number of samples in the header: {count}, numbers up to this line: {there}; {cause}"
     raise text.refusal(first + max(len(lines) - 1, 0), allowed)
 
 
@@ -103,7 +103,7 @@ def _refuse_gaps(text: RecordText, first: int, lengths: list[int]) -> None:
     """Raise InvalidInput for a row whose length differs from that of the first; only the last row may be shorter."""
     for index, length in enumerate(lengths[1:], 1):
         if length != lengths[0] and (index < len(lengths) - 1 or length > lengths[0]):
-            raise text.refusal(first + index, "its length differs from the rows above: samples are missing")
+            raise text.refusal(first + index, "its length differs from that of the rows above: samples are missing")
 
 
 def _refuse_junk(text: RecordText, first: int, lines: list[str], width: int | None) -> None:

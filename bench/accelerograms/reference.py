@@ -17,8 +17,8 @@ from sim.errors import InvalidInput
 GRAMMAR = "FILE[@KEY=VALUE,...] with the keys unit, dt, channel, column and name, or synthetic:NAME[:SEED]"
 
 SHORTEST_STEP, LONGEST_STEP = 1e-4, 0.5
-"""Plausible time steps [s] of a record: strong motion is sampled at 50 to 1000 Hz, old film records at 10 Hz or
-more.
+"""Plausible range of a record's time step [s], with a margin: strong motion is sampled at 50 to 1000 Hz, old film
+records at 10 Hz or more.
 """
 
 _SYNTHETIC = "synthetic:"

@@ -1,8 +1,8 @@
 """U.S. Geological Survey `.smc` files: 11 lines of text, 48 integers, 50 reals, comments, then samples in cm/s2.
 
-Integer 16 is the number of comment lines, 17 that of samples; real 2 is the sampling rate, 30 and 32 are the largest
-and smallest sample. Columns are 10 characters wide and may touch. Source: USGS National Strong-Motion Program,
-"SMC-format data files", sections 3 and 4.
+Integer 16 is the number of comment lines, integer 17 that of samples; real 2 is the sampling rate [Hz], reals 30 and 32
+are the largest and the smallest sample. Columns are 10 characters wide and may touch. Source: USGS National
+Strong-Motion Program, "SMC-format data files", sections 3 and 4.
 """
 
 import re
@@ -13,7 +13,7 @@ from bench.accelerograms.stated import check_peak, count_in, not_acceleration
 from bench.accelerograms.text import RecordText
 
 _TEXT, _INTEGERS, _REALS, _COMMENTS = 11, 17, 27, 27
-"""Numbers of lines before the integers, the reals and the comments."""
+"""Numbers of lines up to the end of the text, of the integers and of the reals, which the comments follow."""
 
 _WIDTH, _REAL_WIDTH = 10, 15
 _TYPE = re.compile(r"^\s*([0-6])\s+([A-Z][A-Z ]+)")
@@ -41,12 +41,18 @@ def read(text: RecordText, choices: Choices) -> Reading:
     first = _COMMENTS + comments
     for index in range(_COMMENTS, first):
         if index >= len(text.lines) or not text.lines[index].startswith("|"):
-            raise text.refusal(min(index, len(text.lines) - 1), f"{comments} comment lines must begin with |")
+            raise text.refusal(
+                min(index, len(text.lines) - 1),
+                f"a comment line must begin with |; comment lines announced by the file: {comments}",
+            )
     count = count_in(text, _TEXT + 2, _field(text, _TEXT, 17))
     reals = numbers(text, _INTEGERS, _REALS, 50, _REAL_WIDTH)
     rate = float(reals.values[1])
     if not 0.0 < rate < _UNKNOWN:
-        raise text.refusal(_INTEGERS, "the second number, the sampling rate, is unknown: the step may vary")
+        raise text.refusal(
+            _INTEGERS,
+            "the second number, the sampling rate, is unknown: the step may vary; use a record with a constant step",
+        )
     samples = numbers(text, first, len(text.lines), count, _WIDTH)
     known = [k for k in (29, 31) if abs(reals.values[k]) < _UNKNOWN]
     if len(known) == 2:
@@ -63,7 +69,7 @@ def read(text: RecordText, choices: Choices) -> Reading:
 
 
 def _comments(text: RecordText) -> int:
-    """Number of comment lines, integer 16. Raises InvalidInput if it is unknown."""
+    """Number of comment lines, integer 16. Raises InvalidInput if it is not a non-negative integer."""
     word = _field(text, _TEXT, 16).strip()
     if re.fullmatch(r"\d+", word) is None:
         raise text.refusal(
@@ -73,6 +79,6 @@ def _comments(text: RecordText) -> int:
 
 
 def _field(text: RecordText, first: int, number: int) -> str:
-    """Text of integer `number`, counted from 1, of the lines from `first` on; a line holds eight."""
+    """Text of integer `number`, counted from 1, in the block that begins at line index `first`, eight per line."""
     row, column = divmod(number - 1, 8)
     return text.lines[first + row][_WIDTH * column : _WIDTH * (column + 1)]

@@ -1,4 +1,4 @@
-"""Checks of the samples against the values stated in the header."""
+"""Values stated in a file's header: parsing, and comparison with the samples."""
 
 import re
 
@@ -13,8 +13,8 @@ from sim.errors import InvalidInput
 def check_peak(text: RecordText, index: int, stated: str, samples: Samples, resolution: float | None = None) -> None:
     """Check the largest magnitude of the samples against the value stated in line `index`, in the samples' unit.
 
-    Both may be off by one in their last digit; `resolution` replaces the last digit of the samples if they were written
-    in another unit.
+    The tolerance is one unit in the last digit of each value; `resolution`, in the samples' unit, replaces the unit in
+    the samples' last digit if they were written in another unit. Raises InvalidInput.
     """
     at = int(np.abs(samples.values).argmax())
     found = abs(float(samples.values[at]))
@@ -35,7 +35,7 @@ def number_in(text: RecordText, index: int, stated: str, item: str) -> float:
 
 
 def count_in(text: RecordText, index: int, stated: str, item: str = "the number of samples") -> int:
-    """An integer above 1 stated in header line `index`. Raises InvalidInput."""
+    """An integer above 1 stated in header line `index`. Raises InvalidInput naming `item` and the line."""
     word = stated.strip()
     if re.fullmatch(r"\d+", word) is None or int(word) < 2:
         raise text.refusal(index, f"{item} must be an integer of at least 2; the header is damaged")
@@ -43,7 +43,7 @@ def count_in(text: RecordText, index: int, stated: str, item: str = "the number 
 
 
 def acceleration_unit(text: RecordText, index: int, stated: str) -> str:
-    """The unit stated in line `index`. Raises InvalidInput for a unit that is not of acceleration."""
+    """The unit stated in line `index`. Raises InvalidInput if it is not a known unit of acceleration."""
     unit = spelled(stated)
     if unit is None:
         raise text.refusal(index, f"{stated.strip()!r} is not a known unit of acceleration")

@@ -69,11 +69,11 @@ SHAPES: dict[str, Shape] = {
 }
 
 NAMES = tuple(SHAPES)
-"""The motions, in the order of the paper's records."""
+"""Names of the motions, in the order of the paper's records."""
 
 
 SIGNIFICANT = 2.73905
-"""c times the time between 5 and 95 % of the envelope's energy: e^2 is a gamma distribution of shape 3."""
+"""c times the time between 5 and 95 % of the envelope's energy: e^2 is a gamma density with shape parameter 3."""
 
 DECAYED = 6.5
 """Value of c t at which the noise ends, where its envelope has fallen to 2.7 % of the maximum; the filters smooth the
@@ -112,7 +112,7 @@ def _white(seed: int, member: int, n: int) -> Array:
 
 
 def _response(frequency: Array, ground: float, damping: float, high_pass: float) -> NDArray[np.complex128]:
-    """Ground acceleration per rock acceleration; convention exp(+i omega t), so that it is causal."""
+    """Transfer function from rock to ground acceleration at `frequency` [Hz], for the time factor exp(+i omega t)."""
     x, y = frequency / ground, frequency / high_pass
     kanai_tajimi = (1.0 + 2j * damping * x) / (1.0 - x**2 + 2j * damping * x)
     return np.asarray(kanai_tajimi * -(y**2) / (1.0 - y**2 + 2j * HIGH_PASS_DAMPING * y), dtype=np.complex128)
@@ -127,7 +127,7 @@ HASHED = 1e-6
 """Resolution [m/s2] to which a record is rounded before hashing, since rounding errors may differ between machines."""
 
 FADING = 1.5
-"""Time after the noise in which the filters' response decays, in periods of the high-pass."""
+"""Duration after the noise for the decay of the filters' response, in periods of the high-pass."""
 
 
 def synthetic_record(name: str, seed: int = DEFAULT_SEED) -> Accelerogram:
@@ -171,7 +171,7 @@ def synthetic_record(name: str, seed: int = DEFAULT_SEED) -> Accelerogram:
 
 
 def _motion(shape: Shape, seed: int, member: int) -> Array:
-    """The motion with the noise scaled so that noise and pulse together have the declared peak."""
+    """Acceleration [m/s2]: the noise is scaled so that noise and pulse together have the declared peak."""
     from scipy.optimize import brentq
 
     rate = SIGNIFICANT / shape.significant
@@ -192,7 +192,7 @@ def _motion(shape: Shape, seed: int, member: int) -> Array:
 
 
 def pulse_acceleration(pulse: Pulse, time: Array) -> Array:
-    """Acceleration [m/s2] of the pulse at `time` [s] from its middle, same shape.
+    """Acceleration [m/s2] of the pulse at `time` [s], counted from its middle; same shape as `time`.
 
     v = V/2 (1 + cos(2 pi t / (gamma T))) cos(2 pi t / T + nu) for |t| < gamma T / 2; for integer gamma above
     1 the residual displacement is zero. Source: Mavroeidis and Papageorgiou, Bull. Seism. Soc. Am. 93, 2003.

@@ -1,4 +1,4 @@
-"""One line of the check: measured value, tolerance and remedy."""
+"""One line of the bench check: measured value, tolerance and remedy."""
 
 from enum import StrEnum
 from math import isfinite
@@ -17,11 +17,11 @@ class Verdict(StrEnum):
 
 
 _OWN_UNIT = "any"
-"""Unit in the declaration of a line's numbers: each line states the actual unit in `unit`."""
+"""Placeholder in the declarations of a line's numbers; `unit` states their actual unit."""
 
 
 class CheckLine(Parameters):
-    """One line of the check. Its numbers are in the unit `unit`; missing values are None."""
+    """One line of the bench check. Its numbers are in the unit `unit`; missing values are None."""
 
     subject: str = quantity(..., "", "channel or part of the bench that is checked")
     what: str = quantity(..., "", "measured property")
@@ -46,8 +46,8 @@ def judged(
     expected: float | None = None,
     uncertainty: float | None = None,
 ) -> CheckLine:
-    """A line that passes if the measured value is within `allowed`, including its ends; the upper end may be
-    infinite.
+    """A line that passes if the measured value is within `allowed` (lowest, highest), limits included; the highest may
+    be infinite.
     """
     lowest, highest = allowed
     passed = lowest <= measured <= highest
@@ -97,5 +97,5 @@ def failed(subject: str, what: str, remedy: str) -> CheckLine:
 
 
 def untested(subject: str, what: str, remedy: str) -> CheckLine:
-    """A line for a quantity that could not be measured."""
+    """A line for a quantity that could not be measured, with the remedy."""
     return CheckLine(subject=subject, what=what, verdict=Verdict.UNTESTED, remedy=remedy)

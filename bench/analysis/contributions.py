@@ -1,4 +1,4 @@
-"""Contributions to the uncertainty budgets: type of evaluation, origin, and how each can be reduced.
+"""Contributions to the uncertainty budgets: type of evaluation, origin, and the action that reduces each.
 
 The types are those of the GUM (JCGM 100:2008, 4.2 and 4.3): A is evaluated from repeated observations, B from other
 information, such as a data sheet or a calibration.
@@ -14,7 +14,7 @@ from bench.analysis.sensor_accuracy import LINEARITY, SCALES, STEPS, TIMING
 
 @dataclass(frozen=True)
 class Source:
-    """Type of evaluation of a contribution, the origin of its value, and the measure that reduces it."""
+    """Type of evaluation of a contribution, the origin of its value, and the action (`measure`) that reduces it."""
 
     type: Literal["A", "B"]
     origin: str
@@ -22,7 +22,7 @@ class Source:
 
 
 _CALIBRATE = "calibrate the lasers (laser calibration test)"
-_FASTER = "use a higher measuring rate of the lasers"
+_FASTER = "increase the measuring rate of the lasers"
 _FINER = "use a laser with a finer resolution or a shorter range"
 _MASSES = "weigh the storeys with a better balance"
 _DECAYS = "record more decays"
@@ -30,7 +30,7 @@ _CLOCK = "calibrate the sample clock against a reference"
 
 SOURCES: Mapping[str, Source] = {
     LINEARITY: Source("B", "data sheet or calibration, limited by the test of the bare frame", _CALIBRATE),
-    SCALES: Source("B", "assumed difference of the scales, or calibration", _CALIBRATE),
+    SCALES: Source("B", "assumed difference between the lasers' scales, or calibration", _CALIBRATE),
     TIMING: Source("B", "assumed wander of the delay: one measuring period", _FASTER),
     STEPS: Source("B", "resolution of the lasers", _FINER),
     "scatter of the cycles": Source("A", "measured cycles, with their correlation", "measure more cycles"),
@@ -40,9 +40,11 @@ SOURCES: Mapping[str, Source] = {
     ),
     "noise of the peaks": Source("A", "residual of the signals around the peaks", "repeat the record"),
     "noise of the table's motion": Source(
-        "A", "noise of the accelerometer at rest, in simulations", "use an accelerometer with less noise"
+        "A", "simulations with the noise of the accelerometer at rest", "use an accelerometer with less noise"
     ),
-    "scale of the table's sensors": Source("B", "assumed scale error, in simulations", "calibrate the accelerometer"),
+    "scale of the table's sensors": Source(
+        "B", "simulations with the assumed scale error", "calibrate the accelerometer"
+    ),
     "stiffness and damping of the frame": Source(
         "B", "assumed or identified specimen, in simulations", "identify the frame (free vibration test)"
     ),

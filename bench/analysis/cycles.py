@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 HARMONICS = 10
-"""Number of jointly fitted harmonics; above them, the drift of a rocking frame has less than 1e-5 of its peak."""
+"""Number of jointly fitted harmonics; the higher harmonics of a rocking frame's drift are below 1e-5 of its peak."""
 
 COMPLETE = 0.98
 """Minimum fraction of valid samples in a cycle: with fewer, a laser that leaves its range at every peak would bias the
@@ -36,19 +36,19 @@ def _basis(phase: NDArray[np.float64], harmonics: int) -> NDArray[np.float64]:
 
 @lru_cache(maxsize=HARMONICS)
 def _period(harmonics: int) -> NDArray[np.float64]:
-    """The basis over one period."""
+    """`_basis` at `_GRID` equally spaced phases of one period."""
     return _basis(_ANGLES, harmonics)
 
 
 @dataclass(frozen=True)
 class Cycle:
-    """One cycle of the drive's period. The last column of every array is for the drive [V], the others for the signals.
+    """One cycle of the drive. The last of the m columns is for the drive [V], the others are for the signals.
 
     `coefficients`, shape (1 + 2 H, m): mean, cosines and sines of the harmonics of phase = omega (sample index) / rate.
     `fundamental` holds the complex amplitudes c with signal = Re(c exp(-i phase)); `peak` is the largest magnitude of
     the fitted motion, including its mean; `noise` is the rms of the residual; shape (m,) each. `extreme`, shape (m,),
-    is the largest magnitude of the samples, for an unsteady motion, whose peak the fit overshoots because the motion
-    differs between the two ends of the cycle.
+    is the largest magnitude of the smoothed samples. It replaces `peak` for an unsteady motion, which the fit
+    overshoots because the motion differs between the two ends of the cycle.
     """
 
     index: int
@@ -141,9 +141,9 @@ class Waves:
     """The mean of many cycles.
 
     `waveform` and `rates`, its derivative with respect to the phase [1/rad], both of shape (k, m), cover one period;
-    `peaks`, shape (m,), are the largest magnitudes, in row `at` of the waveform; `there`, shape (n, m), is each cycle's
-    magnitude in the same row. `harmonics`, shape (m,), is the rms of all harmonics above the fundamental, divided by
-    the fundamental.
+    `peaks`, shape (m,), are the largest magnitudes, interpolated around row `at` of the waveform; `there`, shape (n,
+    m), is each cycle's value in that row, positive in the direction of the peak. `harmonics`, shape (m,), is the rms of
+    all harmonics above the fundamental, divided by the fundamental.
     """
 
     waveform: NDArray[np.float64]
@@ -211,7 +211,7 @@ class CycleAnalyser:
 
     @property
     def completed(self) -> int:
-        """Number of cycles so far, including those without a fit."""
+        """Number of completed cycles, including those without a fit."""
         return self._count
 
     @property

@@ -14,7 +14,7 @@ FALLEN_TILT = 0.25
 
 
 PERIODS = 2.0
-"""Number of periods of the frame's first mode over which u1 is averaged.
+"""Number of periods of the frame's first mode over which the first storey's drift u1 is averaged.
 
 In violent rocking without a fall (30 simulated records, up to 3 times the uplift acceleration) the mean over one period
 reaches 1.28 times the threshold, and the mean over two periods 0.68 times. A fall is detected 0.2 to 0.9 s after the
@@ -23,8 +23,7 @@ tilt of the block has exceeded `FALLEN_TILT`.
 
 
 class FallWatch:
-    """Detector of a fallen block. Such a block deflects the frame permanently: the mean of u1 is k_C h1 sin(theta) /
-    (k1 + k_C).
+    """Detector of a fallen block, which deflects the frame permanently, by a mean u1 of k_C h1 sin(theta) / (k1 + k_C).
 
     The mean is taken over the last samples, at least `PERIODS` of the frame's first mode, which suppresses the forced
     motion and the motion in that mode; the threshold is half the offset at `FALLEN_TILT`.
@@ -39,7 +38,7 @@ class FallWatch:
 
     @property
     def threshold(self) -> float:
-        """Mean of u1 [m] beyond which the block counts as fallen."""
+        """Magnitude of the mean of u1 [m] above which the block counts as fallen."""
         return self._threshold
 
     def fallen(self, signals: NDArray[np.float64]) -> bool:

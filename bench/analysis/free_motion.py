@@ -25,24 +25,24 @@ KEPT = 1000
 
 LINEAR = 0.98
 """Smallest fraction of the changes from cycle to cycle that one pair of multipliers must explain for a rate to be
-stated.
+reported.
 """
 
 
 KNOWN, TURNS = 0.02, 2.0
 """Largest standard uncertainty of the modulus, and minimum number of turns of the spiral about the orbit, for which the
-orbit's peak is stated: a mean over less than a turn covers only one side of the orbit.
+orbit's peak is reported: a mean over less than one turn covers only one side of the orbit.
 """
 
 UNKNOWN = 0.1
-"""Standard uncertainty of the modulus above which no rate is stated, since the multiplier is then due to noise."""
+"""Standard uncertainty of the modulus above which no rate is reported, since the multiplier is then due to noise."""
 
 SMALL = 0.15
-"""Largest relative deviation of the peaks from their mean up to which the peak of the orbit is stated."""
+"""Largest deviation of the peaks, half their range relative to their mean, for which the orbit's peak is reported."""
 
 SHORTEST, SINGULAR, STEP = 24, 1e8, 1e-6
-"""Limits and step of the computation of a rate: smallest number of changes, largest condition number of the equations,
-and step of the finite differences.
+"""Settings for the computation of a rate: smallest number of changes, largest condition number of the equations, and
+step of the finite differences.
 """
 
 
@@ -92,8 +92,8 @@ def free_motion(cycles: Sequence[Cycle]) -> FreeMotion:
 
 def orbit_peak(cycles: Sequence[Cycle], motion: FreeMotion, omega: float) -> SteadyPeak | None:
     """Peak of the mean of the last `CYCLES` cycles at `omega` [rad/s], which to second order in the deviation is the
-    peak of the periodic motion about which the motion revolves. None if the deviation is large or the changes are not
-    those of a linear system.
+    peak of the periodic motion about which the motion spirals. None if the deviation is large, or if the rate is
+    unknown, too uncertain or based on too few turns.
 
     The square of the relative deviation is added as a transient with a rectangular distribution. On exact motions of
     the model near their boundaries of stability, with deviations up to 10 %, the error was at most 5.1e-4.
@@ -105,7 +105,7 @@ def orbit_peak(cycles: Sequence[Cycle], motion: FreeMotion, omega: float) -> Ste
 
 
 def _rate(amplitudes: NDArray[np.complex128]) -> Rate | None:
-    """Rate from the linear map of changes from cycle to cycle, in the plane of their two largest components.
+    """Rate from the linear map of changes from cycle to cycle, in the plane of their two largest principal components.
 
     Earlier changes are the instrumental variables of the least-squares problem. Without them, noise of the amplitudes
     would bias the multipliers towards zero; the noise is independent for changes that share no cycle.

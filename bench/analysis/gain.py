@@ -17,7 +17,7 @@ from bench.analysis.uncertainty import COVERAGE as COVERAGE
 from bench.analysis.uncertainty import Budget, combined_freedom
 
 SCATTER = "scatter of the cycles"
-"""Name of the contribution in a budget."""
+"""Name of this contribution in the budgets."""
 
 DRAWS, SEED = 4000, 1
 """Number of Monte Carlo draws of the sensors' errors; with this number, the expanded uncertainty has a statistical
@@ -56,9 +56,9 @@ class SteadyPeak:
 
     `drift` [m] is its peak; `scatter` [m] and `transient` [m] are the standard uncertainties of that peak due to the
     scatter of the cycles and to a remaining transient. `u1` [m] is the first storey's peak, `amplitude` [m/s2] the
-    table's amplitude and `harmonics` the relative rms of the table's harmonics. `readings` are the lasers' readings at
-    the peak, `cycles` is the number of cycles, and `checks` holds the harmonics of both lasers' readings in a test of
-    the bare frame. `freedom` is the number of degrees of freedom of the scatter.
+    amplitude of the table's acceleration and `harmonics` the relative rms of its harmonics. `readings` are the lasers'
+    readings at the peak, `cycles` is the number of cycles, and `checks` holds the harmonics of both lasers' readings in
+    a test of the bare frame. `freedom` is the number of degrees of freedom of the scatter.
     """
 
     drift: float
@@ -96,7 +96,7 @@ def steady_peak(
     before: Sequence[Cycle] = (),
     frame: LinearFrame | None = None,
 ) -> SteadyPeak:
-    """Peak of the mean cycle at `omega` [rad/s], counted from the mean over the cycle.
+    """Peak of the mean cycle at `omega` [rad/s], relative to the mean over the cycle.
 
     Over a period of a steady motion the second storey gains no momentum, so the force k2 times drift, which alone
     drives it, has zero mean for any motion of the block. The mean is therefore a better zero of the sensors than a
@@ -244,7 +244,7 @@ def gain(
 
 
 def _correlation(errors: NDArray[np.float64]) -> float:
-    """Correlation of the errors in the two tests, shape (2, n); 0 without errors."""
+    """Correlation coefficient of the `errors` in the two tests, shape (2, n); 0 if there are none."""
     centred = errors - errors.mean(axis=1, keepdims=True)
     size = float(np.linalg.norm(centred[0]) * np.linalg.norm(centred[1]))
     return float(centred[0] @ centred[1]) / size if size > 0.0 else 0.0

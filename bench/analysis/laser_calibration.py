@@ -1,4 +1,4 @@
-"""Calibration of the two lasers and of the table's sensors against them, and its application to readings.
+"""Calibration of the two lasers and, against the lasers, of the table's sensors; correction of laser readings.
 
 A laser's error is a Chebyshev polynomial in its reading over the covered readings, and constant beyond them. The
 table's sensors have one factor each: true = factor times reading.
@@ -35,9 +35,7 @@ class LaserCurve(Parameters):
     uncertainty: float = quantity(
         ..., "m", "standard uncertainty of the laser's error at one reading", ge=0, usual=(1e-6, 1e-3)
     )
-    scale: float = quantity(
-        ..., "1", "relative span of the laser's readings, normalised to a mean of 1 over both lasers"
-    )
+    scale: float = quantity(..., "1", "span of the laser's readings, relative to the mean span of both lasers")
     delay: float = quantity(..., "s", "delay relative to the table's displacement sensor", usual=(1e-5, 0.05))
     delay_uncertainty: float = quantity(..., "s", "standard uncertainty of the delay", ge=0, usual=(1e-7, 1e-3))
 
@@ -81,11 +79,11 @@ class LaserCalibration(Parameters):
 
     @property
     def expires(self) -> datetime:
-        """End of validity."""
+        """Date and time at which the calibration ceases to be valid."""
         return self.date + timedelta(days=self.valid_days)
 
     def expired(self, now: datetime) -> str | None:
-        """Warning if the calibration has expired by `now`, which must have a time zone; None while it is valid."""
+        """Warning if the calibration has expired at `now`, which must have a time zone; None while it is valid."""
         if now <= self.expires:
             return None
         return (

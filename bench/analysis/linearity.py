@@ -43,8 +43,8 @@ ZETA_3 = 1.2020569
 """zeta(3), the sum of 1 / m^3 over m = 1, 2, ..."""
 
 CAUTION = 0.3
-"""Factor on the logarithm of the evidence, below 1 because a true curve is not a draw from the process, and because the
-harmonics of a small swing hardly determine the number of waves.
+"""Factor applied to the logarithm of the evidence. It is below 1 because a true curve is not a draw from the process,
+and because the harmonics of a small swing hardly determine the number of waves.
 """
 
 LEAST = 1e-5
@@ -53,7 +53,7 @@ evaluated.
 """
 
 ROUNDING = 1e-12
-"""Smallest fraction of a variance that is not due to rounding."""
+"""Fraction of a variance below which a remainder is due to rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,11 +130,11 @@ class LinearityErrors:
     waves: float
 
     def scaled(self, factors: Sequence[float]) -> "LinearityErrors":
-        """These errors multiplied by one factor per test."""
+        """The errors multiplied by one factor per test."""
         return replace(self, moments=self.moments * np.outer(factors, factors))
 
     def draws(self, normal: Array) -> Array:
-        """Draws of the errors [m], shape (tests, n), from standard normal numbers of that shape."""
+        """Random draws of the errors [m], shape (tests, n), from standard normal numbers `normal` of the same shape."""
         tests = len(self.moments)
         root = np.zeros((tests, tests))
         for i in range(tests):
@@ -154,7 +154,8 @@ def linearity_errors(
     """Errors of peaks measured by one laser with the measuring range `whole` [m] and the largest error `limit` [m].
 
     `shares`, shape (tests,), are the derivatives of the result with respect to the peaks: without `checks`, they
-    determine the worst number of waves. The evaluation of the checks is cached for later calls with the same objects.
+    determine the most unfavourable number of waves, which is then assumed. The evaluation of the checks is cached for
+    later calls with the same objects.
     """
     tests = len(effects)
     if limit == 0.0:
@@ -177,10 +178,10 @@ def linearity_errors(
 
 @dataclass(frozen=True, eq=False)
 class _Posterior:
-    """Information from m measured harmonics about the curve, for each of K curves with different numbers of waves.
-    `whitening`, shape (K, m, m), transforms the harmonics to independent numbers of unit variance; `measured`, shape
-    (K, m), are the transformed harmonics; `likely`, shape (K,), is the weight of each curve. `observed`, shape (m, n),
-    computes the harmonics of a curve from its values at the `places`, shape (n,).
+    """Information from m measured harmonics about the error curve, for each of K candidates with different numbers of
+    waves. `whitening`, shape (K, m, m), transforms the harmonics to independent numbers of unit variance; `measured`,
+    shape (K, m), are the transformed harmonics; `likely`, shape (K,), is the weight of each candidate. `observed`,
+    shape (m, n), computes the harmonics of a curve from its values at the `places`, shape (n,).
     """
 
     places: Array
@@ -228,7 +229,7 @@ def _covariances(one: Array, left: Array, other: Array, right: Array, whole: flo
 
 
 def _rows(blocks: Sequence[Array]) -> Array:
-    """Block-diagonal matrix with these blocks."""
+    """Block-diagonal matrix of the given blocks."""
     found = np.zeros((sum(len(each) for each in blocks), sum(each.shape[1] for each in blocks)))
     top = left = 0
     for each in blocks:
@@ -239,8 +240,8 @@ def _rows(blocks: Sequence[Array]) -> Array:
 
 @lru_cache(maxsize=8)
 def _fourier(points: int, orders: int) -> Array:
-    """Matrix, shape (2 * orders, points), from one period at `points` places to its cosine and sine coefficients of the
-    orders from 2.
+    """Matrix, shape (2 * orders, points), from `points` values over one period to their cosine and sine coefficients,
+    from order 2 on.
     """
     angles = np.outer(np.arange(2, 2 + orders), np.arange(points) * (2.0 * pi / points))
     return np.concatenate((np.cos(angles), np.sin(angles))) * (2.0 / points)

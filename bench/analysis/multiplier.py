@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 SHORTEST, TWICE = 16, 24
-"""Smallest number of cycles from which one pair, and two pairs, are determined."""
+"""Minimum number of cycles for a fit of one pair, and of two pairs."""
 
 BOUND = 0.15
 """Largest deviation of a cycle from the periodic motion, relative to the latter, for which the map is regarded as
@@ -34,8 +34,8 @@ SIGNIFICANT = 3.0
 """Smallest norm of the contribution of a significant pair to the series, relative to that expected from noise alone."""
 
 SHARE = 0.2
-"""Smallest part of a second pair in the series, relative to that of the larger one, for which it may be the dominant
-pair.
+"""Smallest contribution of a pair to the series, relative to that of the larger pair, for which it may be the dominant
+one.
 """
 
 PENCIL = 3
@@ -55,8 +55,8 @@ SMALLEST = 1e-9
 
 @dataclass(frozen=True)
 class Multiplier:
-    """Dominant pair: `modulus` per cycle and `angle` [rad] per cycle, from 0 to pi, with their standard uncertainties
-    due to noise and their correlation.
+    """Dominant pair of multipliers: `modulus` per cycle and `angle` [rad] per cycle, from 0 to pi, with their standard
+    uncertainties due to noise and their correlation.
 
     `cycles` is the number of cycles used, `pairs` the number of fitted pairs, `autocorrelation` that of the residual
     from one cycle to the next, and `coloured` the power of the residual near the angle of the pair, relative to its
@@ -77,8 +77,8 @@ class Multiplier:
 
 
 def linear_part(series: Array, orbit: Array, bound: float = BOUND) -> slice:
-    """Longest run of cycles of `series`, shape (n, m), whose deviation from `orbit`, shape (m,), relative to the norm
-    of the latter, does not exceed `bound`.
+    """Longest run of cycles of `series`, shape (n, m), whose deviation from `orbit`, shape (m,), is at most `bound`
+    times the norm of the orbit.
     """
     within = np.linalg.norm(series - orbit, axis=1) <= bound * float(np.linalg.norm(orbit))
     edges = np.flatnonzero(np.diff(np.concatenate(([False], within, [False])).astype(np.int8)))
@@ -90,8 +90,8 @@ def linear_part(series: Array, orbit: Array, bound: float = BOUND) -> slice:
 
 
 def dominant_multiplier(series: Array) -> Multiplier | None:
-    """Pair of multipliers with the largest modulus, among those that contribute substantially to `series`, shape
-    (n, m), of successive cycles at a constant drive.
+    """Pair of multipliers with the largest modulus, among those that contribute substantially to `series`, shape (n,
+    m): coefficients of successive cycles at a constant drive.
 
     None if there are fewer than `SHORTEST` cycles, or if no pair is significant. Raises ValueError for values that are
     not finite.
@@ -116,9 +116,9 @@ def dominant_multiplier(series: Array) -> Multiplier | None:
 
 @dataclass(frozen=True, eq=False)
 class _Fit:
-    """A fit: its multipliers, the dominant one first, the residual, shape (n, m), the derivatives of the
-    weighted residual, shape (n, m, 2 pairs), with respect to logarithm of modulus and angle of each pair, the weights,
-    shape (m,), the information `criterion`, and the `significance` of the first pair.
+    """A fit: its multipliers, the dominant one first, the residual, shape (n, m), the derivatives of the weighted
+    residual, shape (n, m, 2 pairs), with respect to the logarithm of the modulus and the angle of each pair, the
+    weights, shape (m,), the information `criterion`, and the `significance` of the first pair.
     """
 
     multipliers: Complex
@@ -154,12 +154,12 @@ def _fitted(series: Array, pairs: int) -> _Fit | None:
     parts = _parts(series, unknowns) * weights
     sizes = np.linalg.norm(parts, axis=(1, 2))
     multipliers = np.exp(unknowns[::2] + 1j * unknowns[1::2])
-    # a much smaller pair fits noise, however slowly it decays
+    # a pair with a much smaller contribution fits noise, however slowly it decays
     moduli = np.where(sizes >= SHARE * sizes.max(), np.abs(multipliers), 0.0)
     order = np.argsort(-moduli)
     residual = _left(series, unknowns)
     criterion = 2.0 * n * float(np.sum(np.log(1.0 / weights))) + 2 * pairs * (1 + m) * log(n * m)
-    # the noise in the part of a pair has two degrees of freedom per coefficient
+    # the noise in the contribution of a pair has two degrees of freedom per coefficient
     significance = float(np.linalg.norm(parts[order[0]])) / (2.0 * m) ** 0.5
     slopes = slopes.reshape(n, m, pairs, 2)[:, :, order, :].reshape(n, m, 2 * pairs)
     return _Fit(multipliers[order], residual, slopes, weights, criterion, significance)
@@ -207,11 +207,11 @@ def _coloured(whitened: Array, angle: float) -> float:
 
 
 def _columns(n: int, values: Array) -> Array:
-    """Basis of the series, shape (n, 1 + 2 pairs): a constant, and real and imaginary part of each mu^n, scaled to a
-    largest modulus of 1.
+    """Basis of the series, shape (n, 1 + 2 pairs): a constant, and the real and imaginary parts of each mu^n, scaled to
+    a largest modulus of 1.
     """
     rates: Complex = values[::2] + 1j * values[1::2]
-    # a growing pair is scaled at its end, so that no power overflows
+    # a growing pair is scaled to 1 in the last cycle, so that no power overflows
     times: Array = np.arange(n, dtype=np.float64)[:, None] - np.where(np.real(rates) > 0.0, n - 1.0, 0.0)
     powers: Complex = np.exp(rates * times)
     pairs = np.stack((np.real(powers), np.imag(powers)), axis=2).reshape(n, -1)
@@ -225,7 +225,7 @@ def _left(series: Array, values: Array) -> Array:
 
 
 def _parts(series: Array, values: Array) -> Array:
-    """Part of each pair in the series, shape (pairs, n, m)."""
+    """Contribution of each pair to the series, shape (pairs, n, m)."""
     basis = _columns(series.shape[0], values)
     found = np.linalg.lstsq(basis, series, rcond=None)[0]
     pairs = range(1, basis.shape[1], 2)
@@ -233,7 +233,7 @@ def _parts(series: Array, values: Array) -> Array:
 
 
 def _pencil(series: Array, pairs: int) -> Complex | None:
-    """Initial values of the multipliers, in the upper half plane; None if the series does not contain as many pairs."""
+    """Initial values of the multipliers, in the upper half plane; None if the series contains fewer pairs."""
     changes = np.diff(series, axis=0)
     n = changes.shape[0]
     length = n // PENCIL

@@ -18,16 +18,16 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 DECAYS = (0.7, 0.85, 0.92, 0.95, 0.97, 0.98, 0.988, 0.993)
-"""Moduli rho of the multipliers. The slowest modes of the rocking frame and of the bare frame have 0.97 to 0.985; with
-a slower mode, the motion would have been assessed as unsteady.
+"""Moduli rho of the multipliers. Those of the slowest modes of the rocking frame and of the bare frame are 0.97 to
+0.985; with a slower mode, the motion would have been assessed as unsteady.
 """
 
 ANGLES = (0.0, 0.015, 0.03, 0.05, 0.08, 0.12, 0.2, 0.3, 0.45, 0.6, 0.8, 1.1, 1.4, 1.7, 2.0, 2.3, 2.6, 2.9, pi)
 """Angles psi of the multipliers [rad]."""
 
 CAUTION = 0.3
-"""Factor on the logarithm of the likelihood, below 1 because decays and small angles of nearly equal likelihood shift
-the mean by different amounts, and the grid contains only a few of them.
+"""Factor applied to the logarithm of the likelihood. It is below 1 because decays and small angles of nearly equal
+likelihood shift the mean by different amounts, and the grid contains only a few of them.
 """
 
 FINER = 9
@@ -61,7 +61,7 @@ def remaining_transient(series: Array, measured: int) -> float:
 @dataclass(frozen=True, eq=False)
 class _Fit:
     """Least-squares fits over n cycles, one for each of K modes: the series is fitted by a constant and the mode's real
-    and imaginary part.
+    and imaginary parts.
 
     `modes`, shape (K, n, 3), are the basis functions; `inverse`, (K, 3, 3), the inverse normal matrices; `share`, (K,
     3), the means of the basis functions over the measured cycles, zero for the constant; and `gains`, (K,), the

@@ -16,7 +16,7 @@ from sim.errors import InvalidInput
 Array = NDArray[np.float64]
 
 DAMPING = 0.05
-"""Damping ratio of a response spectrum unless stated otherwise."""
+"""Default damping ratio of a response spectrum."""
 
 _COARSEST_STEP = 0.25
 """Largest omega dt [rad].
@@ -34,7 +34,9 @@ def pseudo_acceleration(acceleration: Array, dt: float, periods: Array, damping:
     """
     record = np.ascontiguousarray(acceleration, dtype=np.float64)
     if record.ndim != 1 or record.size < 2 or not np.isfinite(record).all():
-        raise InvalidInput("record", record.shape, "it must be one-dimensional with at least two finite samples")
+        raise InvalidInput(
+            "record", record.shape, "it must be one-dimensional with at least two samples, all of them finite"
+        )
     if not dt > 0.0:
         raise InvalidInput("dt", dt, "it must be a positive number of seconds")
     if not 0.0 <= damping < 1.0:

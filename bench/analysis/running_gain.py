@@ -1,4 +1,4 @@
-"""Gain coefficient during a test, evaluated at every check of the motion."""
+"""Gain coefficient alpha_2 during a test, evaluated whenever the motion is checked for steadiness."""
 
 import numpy as np
 
@@ -16,7 +16,7 @@ class RunningGain:
     not yet known.
 
     The linearity errors of the lasers, which take most of the computing time, are evaluated again when a reading has
-    changed by more than `CHANGED`. Until then, those of the earlier motion, relative to its drift, are used; this
+    changed by more than `CHANGED`. Until then, those of the earlier motion are used, scaled with the drift; this
     changes the uncertainty by less than 1 %.
     """
 
@@ -26,7 +26,7 @@ class RunningGain:
         self._kept: tuple[PeakReadings, Shapes] | None = None
 
     def of(self, coupled: SteadyPeak) -> Gain:
-        """Gain for the peak `coupled`."""
+        """Gain for the drift peak `coupled` measured so far."""
         shapes: Shapes | None = None
         if self._kept is not None and not _changed(self._kept[0], coupled.readings):
             at, kept = self._kept

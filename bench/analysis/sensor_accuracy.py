@@ -31,7 +31,9 @@ LINEARITY, SCALES, TIMING, STEPS = (
 
 
 class SensorAccuracy(Parameters):
-    """Standard uncertainties of the sensors from data sheets and calibrations."""
+    """Accuracy of the sensors from data sheets and calibrations. Relative errors of scales, of a laser's slope and of
+    the timebase are standard uncertainties; the other values are limits.
+    """
 
     laser_slope: float = quantity(
         0.003, "1", "relative error of one laser's slope over its motion, due to linearity", ge=0, le=0.1
@@ -89,15 +91,15 @@ class PeakReadings:
 
 @dataclass(frozen=True, eq=False)
 class Shapes:
-    """Errors of the same peaks due to the linearity of each laser and, for calibrated lasers, due to that of the
-    calibration's reference sensor, which both lasers have in common.
+    """Errors of the same peaks due to the linearity of each laser and, for calibrated lasers, due to the linearity of
+    the calibration's reference sensor, which affects both lasers equally.
     """
 
     lasers: tuple[LinearityErrors | None, LinearityErrors | None]
     common: LinearityErrors | None = None
 
     def scaled(self, factors: Sequence[float]) -> "Shapes":
-        """These errors multiplied by one factor per peak."""
+        """The errors multiplied by one factor per peak."""
         first, second, common = (None if each is None else each.scaled(factors) for each in (*self.lasers, self.common))
         return Shapes((first, second), common)
 
@@ -121,8 +123,8 @@ class SensorUncertainty:
         return self.accuracy.table_scale if self.calibration is None else self.calibration.table_uncertainty
 
     def checked_by(self, checks: Checks | None) -> "SensorUncertainty":
-        """These sensors with `checks` from one test of the bare frame, unless they already have checks from several
-        tests.
+        """A copy with `checks` from one test of the bare frame; the same object if it already has checks or `checks` is
+        None.
         """
         return self if self.checks or checks is None else replace(self, checks=(checks,))
 
@@ -165,8 +167,8 @@ class SensorUncertainty:
         return Shapes((self._shape(0, seen), self._shape(1, seen)), self._common(seen))
 
     def _shape(self, laser: int, seen: Sequence[PeakReadings]) -> LinearityErrors | None:
-        """Linearity errors of laser 0 or 1; for a calibrated laser, those beyond the covered readings, None if there
-        are none.
+        """Linearity errors of laser 0 or 1; for a calibrated laser, only those outside the calibrated range, None if no
+        reading is outside it.
         """
         whole = self.ranges[laser]
         limit = self.accuracy.laser_linearity * whole
@@ -263,7 +265,7 @@ class Draws:
 
 
 class SharedDraws(Draws):
-    """The same draws for every pair of peaks, generated once."""
+    """Draws that are generated once and are the same for every pair of peaks."""
 
     def __init__(self, seed: int, n: int) -> None:
         super().__init__(np.random.default_rng(seed), n)
@@ -285,8 +287,8 @@ class SharedDraws(Draws):
     def _repeated(self, kind: str, *arguments: Any) -> Array:
         self._asked += ((kind, arguments),)
         if self._asked not in self._kept:
-            # a new order of calls: a zero at rest, for example, requires draws that a mean over a cycle does not
-            # require
+            # the calls differ from the earlier ones: for example, a zero at rest needs draws that a mean over a cycle
+            # does not need
             random = np.random.default_rng(self._seed)
             self._kept[self._asked] = [getattr(random, name)(*given) for name, given in self._asked][-1]
         return self._kept[self._asked]

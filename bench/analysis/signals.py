@@ -25,7 +25,7 @@ MEASURED_BY = (TABLE_ACCELERATION, TABLE_DISPLACEMENT, *STOREYS)
 
 @dataclass(frozen=True)
 class Further:
-    """An additional signal, with the values of one channel."""
+    """An additional signal, which consists of the values of one channel."""
 
     name: str
     unit: str
@@ -38,11 +38,13 @@ def further_of(channels: Sequence[Channel]) -> tuple[Further, ...]:
 
 
 class SignalMap:
-    """Converts channel values to signals relative to the zero taken at rest; one instance per run, owned by the guard.
+    """Converts channel values to signals relative to the zero taken at rest. Each run has one instance, owned by the
+    guard, which enforces the limits.
 
-    Lasers on the ground measure x_g + u, lasers on the table measure u; in both cases the drift does not depend on x_g.
-    A `calibration` corrects lasers and table sensors for their identified errors. All other channels are `further`
-    columns after those of SIGNALS. Raises InvalidInput if a channel is missing.
+    Lasers on the ground measure x_g + u, with the table displacement x_g; lasers on the table measure u. In both cases
+    the drift does not depend on x_g. A `calibration` corrects lasers and table sensors for their identified errors. All
+    other channels become additional columns (`further`) after those of SIGNALS. Raises InvalidInput if a channel is
+    missing.
     """
 
     def __init__(

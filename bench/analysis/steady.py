@@ -15,16 +15,17 @@ WINDOW = 12
 LONGEST_SUBHARMONIC = 6
 
 SPREAD = 5.0
-"""Largest deviation of a cycle of a steady motion from the mean of its window [tolerances]."""
+"""Largest deviation of a cycle of a steady motion from the mean of its window, in units of the tolerance."""
 
 KIN_SHARE = 0.25
-"""A storey that hardly moves is assessed relative to this fraction of the other storey's motion."""
+"""Fraction of the other storey's motion relative to which a storey that hardly moves is assessed."""
 
 
 @dataclass(frozen=True)
 class Steadiness:
-    """Steadiness of a dwell. `spread`, of the cycles within a window, and `drift`, of the mean between the windows, are
-    relative to each signal's mean amplitude and in excess of its noise; each is the largest value of all signals.
+    """Steadiness of a dwell, a period of constant drive. `spread`, the deviation of the cycles within a window, and
+    `drift`, the change of the mean between the windows, are relative to each signal's mean amplitude and in excess of
+    its noise; each is the largest value over all signals.
 
     `repeats` is the number of cycles after which the motion repeats: 1 if it is steady, 2 to 6 for a subharmonic, 0 if
     it does not repeat.
@@ -111,7 +112,9 @@ class SteadyDetector:
         these: NDArray[np.complex128] | NDArray[np.float64],
         those: NDArray[np.complex128] | NDArray[np.float64],
     ) -> NDArray[np.float64]:
-        """Distance between amplitudes, in magnitude, or in phase in excess of the jitter."""
+        """Distance between amplitudes: the larger of the difference in magnitude and the phase difference beyond the
+        jitter [rad], multiplied by the magnitude.
+        """
         size = np.abs(those)
         turned = np.abs(np.angle(these * np.conj(those))) * size
         return np.maximum(np.abs(np.abs(these) - size), turned - self._jitter * size)

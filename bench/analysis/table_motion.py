@@ -19,17 +19,17 @@ class TableMotion(NamedTuple):
 
     @property
     def peak_velocity(self) -> float:
-        """Largest |v| [m/s]."""
+        """Largest |velocity| at the samples [m/s]."""
         return float(np.abs(self.velocity).max())
 
     @property
     def peak_displacement(self) -> float:
-        """Largest |d| [m]."""
+        """Largest |displacement| at the samples [m]."""
         return float(np.abs(self.displacement).max())
 
 
 def table_motion(acceleration: Array, dt: float) -> TableMotion:
-    """The motion under `acceleration` [m/s2], shape (n,), sampled every `dt` [s]."""
+    """Motion from rest under `acceleration` [m/s2], shape (n,), sampled every `dt` [s]."""
     before, after = acceleration[:-1], acceleration[1:]
     velocity, displacement = np.zeros_like(acceleration), np.zeros_like(acceleration)
     np.cumsum((before + after) * (0.5 * dt), out=velocity[1:])
@@ -38,7 +38,8 @@ def table_motion(acceleration: Array, dt: float) -> TableMotion:
 
 
 def with_final_rest(acceleration: Array, dt: float) -> Array:
-    """`acceleration` minus the two lowest sines over its duration, so that the table ends at rest where it began.
+    """`acceleration` [m/s2], shape (n,), minus sines of one half period and one period over its duration, so that the
+    table ends at rest where it began.
 
     The final velocity and displacement are linear in the two amplitudes, so this is exact except for rounding; the
     second iteration corrects the rounding of the first. The sines vanish at both ends and do not change the record's

@@ -13,8 +13,8 @@ remaining noise has the density S_a omega^4 S_x / (S_a + omega^4 S_x).
 
 The output of a sensor whose noise is below its resolution is constant at rest and has an error of up to half a step in
 motion. That error has the variance step^2 / 12, spread over frequencies up to the number of steps passed per second, at
-most half the sample rate (Bennett, Bell Syst. Tech. J. 27, 1948); for slow motions it lies at low frequencies. It
-limits the weight of a sensor.
+most half the sample rate (Bennett, Bell Syst. Tech. J. 27, 1948); in slow motions it is concentrated at low
+frequencies. It limits the weight of a sensor.
 """
 
 from dataclasses import dataclass
@@ -47,11 +47,11 @@ MODEL_RATE = 1000.0
 """Sample rate of the model's input [1/s], at most that of the bench."""
 
 _TOP = 0.4
-"""Fraction of that rate up to which the motion is retained."""
+"""Frequency up to which the motion is retained, as a fraction of the sample rate of the model's input."""
 _NOISE_BAND = (2.0, 60.0)
 """Frequencies [Hz] between which the sensors' noise is assumed white."""
 _PASSING = 0.05
-"""Interval [s] in which a sensor's resolution steps are counted; it is a fraction of the relevant periods."""
+"""Interval [s] in which a sensor's resolution steps are counted; it is shorter than the relevant periods."""
 _CLEAR = 100.0
 """Ratio of power to noise above which a sensor measures the motion."""
 ALIKE = 0.02
@@ -76,12 +76,12 @@ class BaseMotion:
 
     @property
     def record(self) -> SampledRecord:
-        """The motion as an excitation of the model."""
+        """The motion as a base excitation of the model."""
         return SampledRecord(self.acceleration, self.dt)
 
     @property
     def peak(self) -> float:
-        """Largest magnitude [m/s2]."""
+        """Largest |acceleration| at the samples [m/s2]."""
         return float(np.abs(self.acceleration).max())
 
     def draw(self, random: Generator, scale: float = 1.0) -> SampledRecord:
@@ -93,7 +93,7 @@ class BaseMotion:
 
     @cached_property
     def _root(self) -> Array:
-        """Standard deviation of the real and the imaginary part of each line of the noise."""
+        """Standard deviation of the real part, and of the imaginary part, of each spectral line of the noise."""
         root: Array = np.sqrt(self.noise * self.acceleration.size / (4.0 * self.dt))
         return root
 

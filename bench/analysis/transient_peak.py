@@ -94,12 +94,12 @@ class TransientPeak:
 def transient_peak(signal: Array, rest: Array, sample_rate: float) -> TransientPeak:
     """The peak of |`signal`|, shape (n,), which is zero at rest; `rest`, shape (m,), is its noise without motion.
 
-    NaN stands for a missing sample. Raises InvalidInput if there is no motion above the noise, or if samples are
-    missing around the largest motion.
+    NaN denotes a missing sample. Raises InvalidInput if `rest` is too short, if there is no motion above the noise, or
+    if samples are missing around the largest motion.
     """
     known = np.isfinite(signal)
     if rest.size < 16 * _NARROWEST or not np.isfinite(rest).all():
-        allowed = f"it must have at least {16 * _NARROWEST} samples, none of them missing"
+        allowed = f"it must consist of at least {16 * _NARROWEST} samples, none of them missing"
         raise InvalidInput("rest before the transient", rest.size, allowed)
     if not known.any():
         raise InvalidInput("transient", signal.size, "it has no valid sample")
@@ -111,7 +111,9 @@ def transient_peak(signal: Array, rest: Array, sample_rate: float) -> TransientP
     smooth = _smoothed(whole, half)
     spread = sigma * sqrt(_VARIANCE / (2.0 * half))
     if not np.abs(smooth).max() > _RIVALS * max(spread, 1e-300):
-        raise InvalidInput("transient", float(np.abs(smooth).max()), "it does not exceed the noise")
+        raise InvalidInput(
+            "transient", float(np.abs(smooth).max()), "it does not exceed the noise; repeat with a larger motion"
+        )
     found = [_maximum(whole, known, int(place), half, sigma) for place in _candidates(smooth, _RIVALS * spread)]
     greatest = max(found, key=lambda each: each.value)
     value, uncertainty = _greatest(np.array([[each.value, each.uncertainty] for each in found]))

@@ -1,4 +1,4 @@
-"""Statement of uncertainties: mean of a few repeats, budgets, and rounding of values.
+"""Evaluation of uncertainties: mean of a few repeats, budgets, and rounding of values.
 
 The Birge ratio, the square root of chi2 / (R - 1), shows whether R repeats scatter more than their uncertainties state
 (Birge, Physical Review 40 (1932) 207). Where it exceeds 1, the same term is added to each variance to reduce the ratio
@@ -57,8 +57,8 @@ def enlarged(covariance: Array, scatter: Array) -> Array:
 
 
 def student_factor(number: int) -> float:
-    """Factor on the scatter of this number of repeats: the 95 % interval of Student's t divided by that of the normal
-    distribution.
+    """Factor applied to the scatter of `number` repeats: the 95 % interval of Student's t divided by that of the normal
+    distribution; 0 for one repeat.
     """
     from scipy.stats import norm, t
 
@@ -95,7 +95,7 @@ COVERAGE = 2.0
 """Coverage factor k of every expanded uncertainty."""
 
 NORMAL = 1000.0
-"""Degrees of freedom from which on Student's t is not distinguished from the normal distribution."""
+"""Degrees of freedom from which Student's t distribution is replaced by the normal distribution."""
 
 
 @dataclass(frozen=True)
@@ -135,7 +135,7 @@ class Budget:
 
     @property
     def as_json(self) -> str:
-        """All contributions as JSON, largest first."""
+        """All contributions as JSON, largest first, with three significant digits."""
         return json.dumps({name: float(f"{value:.3g}") for name, value in self.largest_first.items()})
 
     @property

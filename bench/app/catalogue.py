@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from sim.parameters import Parameters
 
 PROTOCOLS, EXPORTS = "rockbench.protocols", "rockbench.exports"
-"""Groups of entry points."""
+"""Entry-point groups of protocols and of export formats."""
 
 CHECK = "check"
 """The protocol that has a top-level command instead of `rockbench run`."""

@@ -1,18 +1,18 @@
 """Covariance of a fit, by source of uncertainty.
 
-Every error of a measured signal shifts the values by the gain of the linearised fit (`Fit.moved`). The sources differ
-in how the error is described:
+The linearised fit converts an error of a measured signal into a shift of the fitted values (`Fit.moved`). The error is
+described differently for each source:
 
 - noise: from the spectrum of the residual (Welch), because neighbouring samples are correlated (laser resolution,
 filters); each quantity is affected only by the noise at the frequencies that determine it;
 - table: the noise of the table's sensor, filtered by the frame's response while a mode rings; the
 density of this noise is measured at rest before the motion;
-- clock: the lasers' clocks run freely, so that the delay of a laser wanders by up to one of its measuring periods;
+- clock: the lasers' clocks are not synchronised, so that a laser's delay wanders by up to one of its measuring periods;
 - linearity: sine waves over the lasers' range, of any phase and typical numbers of periods, mostly absorbed by the
 fitted curvature;
 - masses: the uncertainty of the weighing;
-- timebase: a relative error of the sample clock affects frequencies and dashpots once, stiffnesses twice, and damping
-ratios not at all.
+- timebase: a relative error of the sample clock appears once in frequencies and dashpots, twice in stiffnesses, and not
+    in damping ratios.
 
 Errors due to noise, table and clock are independent between decays. Those due to linearity, masses and timebase are
 common to all decays.
@@ -34,16 +34,14 @@ WAVES = np.arange(0.5, 3.01, 0.5)
 """Numbers of periods of a linearity error within the range of a laser."""
 
 CLOCKS = np.array([5e-6, 1e-5, 2e-5, 5e-5, 1e-4])
-"""Relative errors of a laser's clock; they determine how often the laser has one measurement more or less than the
-sample clock.
-"""
+"""Assumed relative errors of a laser's clock, which determine how fast the laser's delay wanders."""
 
 PHASES = 8
-"""Number of phases of the delay's wander that are evaluated."""
+"""Number of initial phases evaluated for a wandering delay."""
 
 
 def waves(fit: Fit, size: float, ranges: tuple[float, float]) -> Array:
-    """Linearity errors of each laser, for every number of periods and both quadrature components, shape (m, 2, n)."""
+    """Linearity errors [m] of each laser for all numbers of periods and both quadrature components, shape (m, 2, n)."""
     seen = fit.fitted
     errors: list[Array] = []
     # the phase is uniformly distributed, so each quadrature component has half the power
@@ -59,7 +57,9 @@ def waves(fit: Fit, size: float, ranges: tuple[float, float]) -> Array:
 
 
 def clocks(fit: Fit, wander: float) -> Array:
-    """Sawtooth delays of each laser of up to `wander` [s], at several rates and phases, shape (m, 2, n)."""
+    """Errors [m] of each laser due to sawtooth delays with a range of `wander` [s], at several rates and phases; shape
+    (m, 2, n).
+    """
     speed, time = np.gradient(fit.fitted, fit.stretch.step, axis=1), fit.stretch.time
     errors: list[Array] = []
     for laser in range(2):
@@ -76,7 +76,7 @@ OWN, COMMON = ("noise", "table", "clock"), ("linearity", "masses", "timebase")
 """Sources that are independent between decays, and sources common to all decays."""
 
 _RATES = np.array([2.0, 2.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0])
-"""Exponents of the sample rate in the quantities of `response.NAMES`."""
+"""Exponents with which the sample rate enters the quantities of `response.NAMES`."""
 
 SEGMENT = 4.0
 """Duration of the segments for the spectrum of the residual [s]."""
@@ -122,7 +122,7 @@ class Uncertainty:
 
 
 def fit_uncertainty(fit: Fit, errors: Errors) -> Uncertainty:
-    """The covariances of a fit."""
+    """Covariances of the quantities derived from a fit."""
     turn, direct = slopes(fit.constants)
     turn = np.hstack((turn, np.zeros((len(turn), fit.values.size - turn.shape[1]))))
     shift = turn @ -fit.moved(fit.mass_jacobian).T + direct
@@ -133,8 +133,7 @@ def fit_uncertainty(fit: Fit, errors: Errors) -> Uncertainty:
 
 
 def covariances(fit: Fit, errors: Errors) -> tuple[Array, Array]:
-    """Covariances of all values of a linearised fit, independent between decays and common to all.
-
+    """Covariances of all values of a linearised fit: the part that is independent between decays, and the common part.
     They include neither masses nor timebase.
     """
     parts = _parts(fit, errors)
@@ -157,8 +156,8 @@ def _spread(moved: Array) -> Array:
 
 
 def _noise(fit: Fit) -> Array:
-    """Contribution of noise, from the spectrum of each laser's residual: J R J', where R is the covariance of the
-    residual.
+    """Contribution of noise: the covariance of each laser's residual, from its spectrum, propagated through the
+    linearised fit.
     """
     from scipy import signal
 

@@ -80,8 +80,8 @@ def damping_courses(
 
 @dataclass(frozen=True, eq=False)
 class _Mode:
-    """One mode: its circular frequency, the amplitude of its drift, shape (n,), and its part of the laser signals, (2,
-    n).
+    """One mode: its circular frequency, the amplitude of its drift, shape (n,), and its part of the laser signals,
+    shape (2, n).
 
     `windows` holds the samples of each window.
     """
@@ -106,7 +106,7 @@ def _mode(fit: Fit, which: int, begin: float, omega: float) -> _Mode:
     amplitude = 2.0 * np.abs(drift) * np.abs(q[which])
     after = stretch.time >= begin
     largest = float(amplitude[after].max())
-    # windows follow the decay of the model, because late measured amplitudes are noise
+    # the windows follow the decay of the model, because the measured amplitudes become noise
     rate = -float(found.poles[which].real)
     last = min(np.log(1.0 / FLOOR) / rate, float(stretch.time[-1]) - begin)
     edges = [begin + last * share for share in np.linspace(0.0, 1.0, WINDOWS + 1).tolist()]
@@ -121,7 +121,7 @@ def _mode(fit: Fit, which: int, begin: float, omega: float) -> _Mode:
 
 
 def _stepped(extended: Fit) -> tuple[Array, Fit]:
-    """Shifts of all values that lead to the best fit, and the fit with the remaining residual."""
+    """Shifts of all values to the optimum of the linearised fit, and the fit with the remaining residual."""
     moved = extended.moved(extended.residual)
     left = extended.residual - np.tensordot(moved, extended.jacobian, 1)
     return moved, replace(extended, residual=np.where(extended.residual == 0.0, 0.0, left))

@@ -18,13 +18,13 @@ from bench.analysis.uncertainty import enlarged, mean_of_repeats
 Array = NDArray[np.float64]
 
 LET_GO = 0.2
-"""Time excluded after the start of a release, until the hand has left the storey [s]."""
+"""Time excluded after the start of a release [s], in which the operator's hand leaves the storey."""
 
 _HELD = 0.5
-"""Time at the start of a recording during which the storey is still held [s]."""
+"""Time from the start of a recording during which the storey is assumed to be held [s]."""
 
 _SLIPPED = 0.1
-"""Fraction of a storey's largest later displacement at which the storey counts as released."""
+"""Fraction of a storey's largest displacement at which the storey counts as released."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +47,7 @@ class Decay:
     """One decay: the `quantities` of `response.NAMES`, shape (8,), their uncertainty, the underlying fit, the damping
     of each mode against its amplitude, and the end of the excitation (`begin` [s]).
 
-    `peak` [m] is the largest drift.
+    `peak` [m] is the largest measured drift of storey 2 relative to storey 1.
     """
 
     quantities: Array
@@ -96,8 +96,8 @@ def _decay(stretch: Stretch, setting: Setting, quiet: float, begin: float) -> De
 
 
 def _released(stretch: Stretch) -> float:
-    """Time [s] at which storey 2 is released: it has then moved by a fraction of its largest later displacement. Raises
-    Unusable if there was no release.
+    """Time [s] at which storey 2 is released: its displacement first exceeds the fraction `_SLIPPED` of its maximum.
+    Raises Unusable if there was no release.
     """
     seen = stretch.readings[1] - np.nanmedian(stretch.readings[1][stretch.time < _HELD])
     moved = np.nan_to_num(np.abs(seen))
@@ -108,8 +108,8 @@ def _released(stretch: Stretch) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Combined:
-    """`values`, shape (n,), and their covariance, shape (n, n): the part that is independent between decays (`own`),
-    and the `common` part.
+    """Mean of R decays: `values`, shape (n,), and their covariance, shape (n, n), in two parts: from errors that are
+    independent between decays (`own`) and from `common` errors.
 
     `birge` are the Birge ratios, shape (n,), NaN for a single decay; `weights`, shape (R, n), sum to 1; `scatter`,
     shape (n,), is the excess scatter of the decays as a standard uncertainty, included in `own`.

@@ -21,18 +21,18 @@ from bench.analysis.free_decay.stretch import Stretch, Unusable
 Array = NDArray[np.float64]
 
 BEND = (2, 3, 4, 5)
-"""Exponents of the curvature terms of a laser's characteristic, from 2 on."""
+"""Exponents of the curvature terms of a laser's characteristic."""
 
 CONSTANTS, STATE = slice(0, 4), slice(4, 8)
 GAINS, DELAYS, OFFSETS = slice(8, 10), slice(10, 12), slice(12, 14)
 BENDS = slice(14, 14 + 2 * len(BEND))
 COUNT = BENDS.stop
-"""Indices of the fitted values: k1, k2, c1, c2 of the frame, the frame's initial state, then the lasers' parameters."""
+"""Indices and number of the fitted values: k1, k2, c1, c2 of the frame, its initial state, the lasers' parameters."""
 
 
 @dataclass(frozen=True, eq=False)
 class Shown:
-    """The laser signals as a function of COUNT values. `reach` [m], shape (2,), contains the R_i."""
+    """Model of the laser signals as a function of the COUNT fitted values; `reach` [m], shape (2,), holds the R_i."""
 
     stretch: Stretch
     masses: tuple[float, float]
@@ -108,7 +108,7 @@ NOISE = 2e-5
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """Result of a fit: `values`, shape (COUNT,), in SI units, k1 to c2 first.
+    """Result of a fit: `values`, shape (COUNT,), in SI units, beginning with k1, k2, c1, c2.
 
     `jacobian`, shape (COUNT, 2, n), holds the derivatives of the laser signals with respect to the values, zero where a
     sample is missing; `mass_jacobian`, shape (2, 2, n), those with respect to the masses; `residual` [m], shape (2, n),
@@ -133,7 +133,7 @@ class Fit:
 
     @property
     def response(self) -> Response:
-        """The model's response at the samples of the section."""
+        """Modal response of the identified frame, for the sample interval of the section."""
         return response(self.constants, self.stretch.step)
 
     def moved(self, error: Array) -> Array:

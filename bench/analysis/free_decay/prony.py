@@ -27,7 +27,7 @@ LENGTH = 15.0
 """Duration used for the estimate [s], after which the second mode has decayed."""
 
 DAMPING = 0.003, 0.06
-"""Range of damping ratios at the start of the fit."""
+"""Range to which the estimated damping ratios are limited."""
 
 ORDER = 4
 """Order of the difference equation, for two modes."""
@@ -61,7 +61,7 @@ def constants_of(poles: Complex, ratios: Array, m1: float, m2: float) -> Constan
     inverse = 1.0 / m1 + 1.0 / m2
     root = np.sqrt(max(total**2 - 4.0 * inverse * m2 * product, 0.0))
     pairs = (total + root * np.array([-1.0, 1.0])) / (2.0 * inverse)
-    # from the second row of the eigenproblem
+    # ratio of storey 2 to storey 1 in the first mode, from the second row of the eigenproblem
     shown = pairs / (pairs - squares[0] * m2)
     k2 = float(pairs[np.argmin(np.abs(shown - ratios[0]))])
     k1 = product * m1 * m2 / k2
@@ -97,7 +97,7 @@ def _poles(seen: Array, x: Array, step: float) -> Complex:
 
 
 def _ratios(seen: Array, x: Array, poles: Complex, step: float) -> Array:
-    """Mode shapes from the free and driven contributions of the modes to each signal."""
+    """Ratio of storey 2 to storey 1 in each mode, shape (2,), from its free and driven contributions to the signals."""
     from scipy import signal
 
     time = step * np.arange(x.size)

@@ -1,7 +1,7 @@
 """Exact linear response of the frame on a moving table, in closed form in modal coordinates.
 
-With z the absolute displacements of the storeys and x that of the table, the lower springs and dashpots act on the
-motion relative to the table:
+With z the absolute displacements of the storeys and x that of the table, the lower spring k_1 and dashpot c_1 act on
+the motion relative to the table:
 
     M z'' + C z' + K z = (k_1 x + c_1 x', 0)
 
@@ -67,7 +67,7 @@ class Response:
         q = np.zeros((2, x.size), np.complex128)
         for mode in range(2):
             taps = self.push[mode] * h * np.array([second[mode], first[mode] - second[mode]])
-            # the first sample is only the start of the first line segment
+            # the first sample has no segment of the interpolated motion before it
             q[mode] = lfilter(taps, [1.0, -turn[mode]], x, zi=-taps[:1] * x[0])[0]
         return q
 
@@ -83,7 +83,7 @@ class Response:
 
 
 def response(constants: Constants, step: float) -> Response:
-    """The modes of a frame. Raises ArithmeticError unless the frame oscillates in both."""
+    """The modes of a frame sampled every `step` [s]. Raises ArithmeticError unless both modes oscillate."""
     m1, m2, k1, k2, c1, c2 = constants
     inverse = np.array([[1.0 / m1], [1.0 / m2]])
     stiffness = inverse * np.array([[k1 + k2, -k2], [-k2, k2]])
@@ -111,7 +111,7 @@ def response(constants: Constants, step: float) -> Response:
 
 
 NAMES = ("k1", "k2", "xi1", "xi2", "c1", "c2", "omega1", "omega2")
-"""Quantities identified from a decay, in SI units: stiffnesses, modal damping ratios, dashpots, frequencies."""
+"""Quantities identified from a decay: stiffnesses, modal damping ratios, dashpots, undamped circular frequencies."""
 
 UNITS = ("N/m", "N/m", "1", "1", "N s/m", "N s/m", "rad/s", "rad/s")
 K1, K2, XI1, XI2, C1, C2, OMEGA1, OMEGA2 = range(len(NAMES))

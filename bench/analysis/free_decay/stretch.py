@@ -1,6 +1,6 @@
 """The fitted section of a recording, reduced to means over a few samples.
 
-The mean is the same linear filter on all channels, so its output obeys the same equations as its input.
+Averaging is the same linear filter for all channels, so the means obey the same equations as the samples.
 """
 
 from dataclasses import dataclass, replace
@@ -30,9 +30,9 @@ class Unusable(RockbenchError):
 
 @dataclass(frozen=True, eq=False)
 class Stretch:
-    """`time`, shape (n,) [s], evenly spaced, from the first sample; `table` [m], shape (n,), the reading of
-    the table's sensor, and `readings` [m], shape (2, n), the readings of the lasers on storeys 1 and 2, NaN where
-    invalid.
+    """Section of a recording: `time` [s], shape (n,), evenly spaced, since the first sample of the recording; `table`
+    [m], shape (n,), the displacement of the table; `readings` [m], shape (2, n), the readings of the lasers on storeys
+    1 and 2, NaN where invalid.
 
     If `on_table`, the lasers are fixed to the table and measure relative to it.
     """
@@ -49,7 +49,7 @@ class Stretch:
 
     @cached_property
     def _course(self) -> tuple[Array, Array, Array]:
-        """The table's motion, corrected for linear interpolation, and its first two derivatives.
+        """Displacement [m] of the table, corrected for linear interpolation, velocity [m/s] and acceleration [m/s2].
 
         Linear interpolation reduces a sine by the fraction (omega step)^2 / 12; the second difference restores it.
         """
@@ -59,8 +59,8 @@ class Stretch:
         return course, rate, np.gradient(rate, self.step)
 
     def driving(self, delay: float) -> tuple[Array, Array]:
-        """Displacement [m] and velocity [m/s] of the table, `delay` [s] before each sample, to second order in the
-        delay.
+        """Displacement [m] of the table `delay` [s] before each sample, to second order in the delay, and velocity
+        [m/s] at the sample.
         """
         course, rate, bent = self._course
         return course - delay * rate + 0.5 * delay**2 * bent, rate

@@ -1,4 +1,5 @@
-"""Results of several tilts with their uncertainty: restitution and trend, slenderness and size; laser errors.
+"""Results of several tilts with their uncertainties: restitution, its trend, critical angle, frequency parameter. The
+errors of the laser are modelled as follows.
 
 Linearity: a smooth error, size sin(2 pi n x / range + phase), with `size` from the data sheet, and with uniformly
 distributed phase and number n of periods within the measuring range; it is common to all tilts. The fitted curvature
@@ -30,13 +31,13 @@ from sim.specimen import Specimen
 Array = NDArray[np.float64]
 
 POOR = 0.2
-"""Ratio of residual to mean amplitude above which the model does not describe the motion.
+"""Ratio of the rms residual to the mean peak displacement above which the model does not describe the motion.
 
 Impacts whose restitution differs by 1 % cause a ratio of about 0.1.
 """
 
 PUSH = 0.03
-"""Relative difference between fitted and held tilt up to which a release counts as a release from rest."""
+"""Relative difference between the fitted and the initial tilt up to which the block counts as released from rest."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +52,7 @@ class Tilt:
 
     @property
     def push(self) -> float:
-        """Relative difference between the tilt of the equivalent release from rest and the held tilt."""
+        """Excess of the tilt of the equivalent release from rest over the initial tilt, relative to the latter."""
         return abs(self.fit.motion.tilt / self.swings.held) - 1.0
 
 
@@ -89,7 +90,7 @@ as a scale error, one with more is not smooth.
 """
 
 CLOCK = 50e-6
-"""Largest relative difference between the rates of the laser's clock and of the sample clock, which are quartz
+"""Largest relative difference between the rates of the laser's clock and the sample clock, both of which are quartz
 clocks.
 """
 
@@ -139,7 +140,7 @@ class LaserErrors:
 
 
 def _middles(low: float, high: float, count: int) -> Array:
-    """The midpoints of `count` equal parts of a range."""
+    """The midpoints of `count` equal parts of the range from `low` to `high`, shape (count,)."""
     return low + (high - low) * (np.arange(count) + 0.5) / count
 
 
@@ -165,7 +166,7 @@ class Combined:
 
     @property
     def uncertainty(self) -> float:
-        """Standard uncertainty."""
+        """Combined standard uncertainty."""
         return hypot(self.noise, self.timing, self.linearity, self.scale, self.scatter)
 
     def parts(self) -> dict[str, float]:
@@ -208,10 +209,11 @@ error.
 
 @dataclass(frozen=True)
 class Findings:
-    """`motion` is the restitution from the fits, `trend` its change with the impact speed, and `relation` the
-    restitution from the amplitudes alone.
+    """Combined results of all tilts: `motion` is the restitution from the fits, `trend` its change with the impact
+    speed, and `relation` the restitution from the amplitudes alone.
 
-    `alpha` [rad] and `p` [rad/s] are the identified critical angle and frequency parameter.
+    `alpha` [rad] and `p` [rad/s] are the identified critical angle and frequency parameter; `impacts` is the number of
+    impacts.
     """
 
     motion: Combined
@@ -235,9 +237,9 @@ class Findings:
 def findings(tilts: Sequence[Tilt], laser: LaserErrors, height: float, height_uncertainty: float) -> Findings:
     """Combine the tilts. For a single tilt, the uncertainty has no contribution from the scatter between tilts.
 
-    Errors of the beam's `height` [m] and of the laser's scale affect the conversion to an angle: they affect alpha
-    fully, the amplitude relation slightly, and r and p, which depend on time, not at all. p has the error of the sample
-    clock.
+    Errors of the laser beam's `height` [m] and of the laser's scale affect the conversion to an angle. They affect
+    alpha fully, the amplitude relation slightly, and r and p, which depend on time, not at all. The error of the sample
+    clock affects p.
     """
     fits = [tilt.fit for tilt in tilts]
     linearity = np.array([laser.linearity(fit) for fit in fits])

@@ -28,7 +28,7 @@ NAMES = ("alpha", "p", "restitution", "share", "start", "zero", "bend_2", "bend_
 ALPHA, P, R, SHARE, START, ZERO, BEND_2, BEND_3 = range(len(NAMES))
 
 FREE = 0.9
-"""Fraction of the held tilt below which the block counts as released."""
+"""Fraction of the initial tilt below which the block counts as released."""
 
 FEWEST = 12
 """Minimum number of impacts for a fit."""
@@ -182,7 +182,7 @@ def _block_means(samples: Array, size: int) -> Array:
 
 def _bounds(alpha: float, p: float) -> tuple[Array, Array]:
     """Lower and upper bounds of the values: alpha and p within a factor of two of those from the geometry, r and the
-    ratio of tilt to alpha where a motion exists, and the others wide.
+    ratio of tilt to alpha within the range in which a motion exists; the other bounds are wide.
     """
     lowest = np.array([0.5 * alpha, 0.5 * p, 0.05, 1e-3, -1e4, -1.0, -10.0, -1e3])
     return lowest, np.array([2.0 * alpha, 2.0 * p, 0.9999, 0.999, 1e4, 1.0, 10.0, 1e3])
@@ -193,8 +193,8 @@ def _from_points(swings: Swings, points: Points, alpha: float, p: float) -> Arra
     known = np.isfinite(points.impacts) & np.isfinite(points.amplitudes)
     count = known.size if known.all() else int(np.argmin(known))
     if count < FEWEST:
-        few = f"{count} impacts are large enough, but {FEWEST} are required"
-        raise NotRocking(f"{few}: tilt the block farther, or mount the laser higher")
+        few = f"number of sufficiently large impacts: {count}, at least {FEWEST} required"
+        raise NotRocking(f"{few}; tilt the block farther, or mount the laser higher")
     instants, sizes = points.impacts[:count], np.abs(points.amplitudes[:count])
     side = float(np.sign(swings.held))
     left = np.log(energy(np.minimum(sizes, 0.99 * alpha), alpha))

@@ -43,8 +43,8 @@ _FEWEST = 12
 
 @dataclass(frozen=True, eq=False)
 class Points:
-    """`impacts` [s], shape (n,), accurate to 50 us, and `amplitudes` [rad], shape (n,), signed, of the turning points
-    that follow them, with standard uncertainties due to noise; NaN where too few samples remain.
+    """Times of the `impacts` [s], accurate to 50 us, and signed `amplitudes` [rad] of the turning points that follow
+    them, with their standard uncertainties due to noise; shape (n,) each, NaN where too few samples remain.
     """
 
     impacts: Array
@@ -70,7 +70,9 @@ def find_points(seen: Recording, swings: Swings, zero: float) -> Points:
 
 
 def _impact(times: Array, angle: Array, guess: float, window: float) -> tuple[float, float]:
-    """Zero crossing of a cubic whose slope and curvature change at the crossing, and its standard uncertainty [s]."""
+    """Time [s] of the zero crossing of a cubic whose slope and curvature change there, and its standard uncertainty
+    [s].
+    """
     instant, uncertainty = guess, np.nan
     for _ in range(3):
         instant, uncertainty = _closer(times, angle, instant, window)

@@ -12,7 +12,7 @@ from sim.specimen import Block
 Array = NDArray[np.float64]
 
 REST = 1.0
-"""Time at the end of a recording for which the block must be at rest [s]."""
+"""Duration at the end of a recording during which the block must be at rest [s]."""
 
 GAP = 0.005
 """Longest gap without valid samples [s] that is interpolated; the error of the interpolation is below 5 um."""
@@ -21,10 +21,10 @@ STILL = 2e-4
 """Largest standard deviation [m] of the displacement at rest, due to the resolution and noise of a laser."""
 
 _HELD = 0.5
-"""Time at the beginning of a recording over which the held tilt is averaged [s]."""
+"""Duration at the beginning of a recording over which the initial tilt is averaged [s]."""
 
 _SHARE = 0.25
-"""Fraction of the smallest usable angle that the block must reach on the other side."""
+"""Fraction of the smallest usable angle that a sample must exceed to count as a tilt to one side."""
 
 
 class NotRocking(RockbenchError):
@@ -46,11 +46,11 @@ class Recording:
 
     @property
     def times(self) -> Array:
-        """Seconds since the first sample, shape (n,)."""
+        """Time [s] since the first sample, shape (n,)."""
         return np.arange(self.displacement.size) / self.sample_rate
 
     def angle(self, zero: float) -> Array:
-        """theta [rad], shape (n,), for a laser that reads `zero` [m] when the block is at rest."""
+        """Rotation of the block [rad], shape (n,), if the laser reads `zero` [m] with the block at rest."""
         return block_face.rotation(self.displacement - zero, self.height, self.block)
 
 

@@ -1,4 +1,4 @@
-"""Benchmark of commands for which a person waits: elapsed time, processor time and memory of each, in a separate
+"""Benchmark of commands whose result a user waits for: elapsed time, processor time and memory of each, in its own
 process.
 """
 
@@ -30,7 +30,7 @@ class Waited:
 
     line : arguments of the command.
     limit : maximum time [s].
-    of : the time to which `limit` applies, elapsed or processor time.
+    of : key of the time to which `limit` applies: elapsed or processor time.
     memory : maximum memory [MB]; None for no limit.
     quick : whether the quick benchmark includes the command.
     """
@@ -50,13 +50,13 @@ COMMANDS = (
     Waited("predict map --omega 12:21:1000 --beta 0.1:1.2:1000 --out map.h5", 40.0, memory=1000.0),
     Waited("run earthquake --out campaign", 60.0),
 )
-"""Commands under records use the seven synthetic ones: with 40 stiffnesses in `predict seismic`, with three springs in
-the campaign.
+"""Commands with earthquake records use the seven synthetic ones: `predict seismic` with 40 stiffnesses, the campaign
+with three springs.
 """
 
 
 def commands(quick: bool) -> Section:
-    """Run every command once with the compiled kernel; with `quick`, only the short ones."""
+    """Run every command once, with a kernel that is already compiled; with `quick`, only the short commands."""
     rows: list[dict[str, Cell]] = []
     targets: list[Target] = []
     for each in COMMANDS:
@@ -73,14 +73,14 @@ def commands(quick: bool) -> Section:
             measured = memory if isinstance(memory, float) else None
             targets.append(Target(f"memory of {name}, 1000 x 1000", each.memory, measured, "MB"))
     notes = (
-        "Each command runs once in a new process, with the compiled kernel but without results kept from earlier runs. "
+        "Each command runs once in a new process, with the compiled kernel but without cached results. "
         "The targets for elapsed times apply to two processors without other load.",
     )
     return Section("commands", "Commands", COLUMNS, rows, notes, targets)
 
 
 def _measured(arguments: Sequence[str], folder: Path) -> dict[str, Cell]:
-    """Times and greatest memory of a command in `folder`; None where the system does not report them. Raises
+    """Times [s] and peak memory [MB] of a command run in `folder`; None where the system does not report them. Raises
     RockbenchError if the command fails.
     """
     code = f"import sys; from bench.app.cli.process import run; sys.argv[1:] = {list(arguments)!r}; run()"
@@ -108,9 +108,8 @@ def _measured(arguments: Sequence[str], folder: Path) -> dict[str, Cell]:
 
 
 def _ended(process: "subprocess.Popen[bytes]") -> tuple[int, float | None, float | None]:
-    """Exit code, processor time [s] and greatest memory [MB] of a process at its end.
-
-    On Linux the greatest memory is at least that of the process that started it.
+    """Exit code, processor time [s] and peak memory [MB] of a process, when it has ended.  On Linux the peak memory is
+    at least that of the parent process.
     """
     if sys.platform == "win32":
         end(process, float("inf"))

@@ -26,7 +26,9 @@ COLUMNS = (
 OURS, THEIRS = "taylor", "heyoka, batch of 4"
 
 MEMBERS = 8
-"""Number of trajectories in a run of the engine: two for each lane, so that lanes are refilled."""
+"""Number of trajectories in a run of the engine: two for each of the kernel's parallel lanes, so that lanes are
+refilled.
+"""
 
 TOLERANCES = (1e-9, 1e-10, 1e-11, 1e-12, 1e-13)
 
@@ -81,8 +83,8 @@ def members(repetitions: int) -> Section:
 
 
 def _at_equal_error(rows: list[dict[str, Cell]]) -> float | None:
-    """Time of the engine's fastest setting that is at least as accurate as a setting of heyoka, relative to the time of
-    that setting: the greatest ratio over the settings of heyoka.
+    """For each setting of heyoka, the time of the engine's fastest setting that is at least as accurate is divided by
+    heyoka's time. Returns the greatest of these ratios; None if there is none.
     """
     found = {name: [row for row in rows if row["method"] == name and row["status"] == "ok"] for name in (OURS, THEIRS)}
     ratios: list[float] = []

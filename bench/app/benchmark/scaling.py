@@ -162,10 +162,10 @@ RATE = 20_000
 """Output states per second."""
 
 BLOCK = 0.05
-"""Length of a block [s]."""
+"""Duration of a block [s]."""
 
 CHECKED = 0.5
-"""Length of the comparison with another integrator [s]."""
+"""Duration of the comparison with another integrator [s]."""
 
 STREAMING_COLUMNS = (
     Column("drive_hz", "updates of the drive [1/s]", "d"),
@@ -210,6 +210,8 @@ def _row(rate: int, duration: float, repetitions: int) -> dict[str, Cell]:
 
 
 def _stream(wave: NDArray[np.float64], rate: int, block: int) -> NDArray[np.float64]:
-    """All output states, shape (n, 6)."""
+    """Output states, shape (n, 6), for the drive `wave` [m/s2], sampled at `rate` [1/s] and fed in blocks of `block`
+    samples.
+    """
     stream = Stream(ROCKING, 1.0 / rate, state=ROCKING_START, divisions=RATE // rate)
     return np.concatenate([stream.feed(wave[k : k + block]) for k in range(0, wave.size, block)])

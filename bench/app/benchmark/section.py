@@ -107,7 +107,7 @@ class Section:
     targets: Sequence[Target] = field(default=())
 
     def text(self) -> str:
-        """The table in aligned columns."""
+        """The section as plain text, with aligned columns."""
         columns = [TextColumn(column.heading, words=column.form == "s") for column in self.columns]
         return "\n".join([self.title, "", text_table(columns, self._cells()), *self.notes])
 

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from bench.replay.session import Replayed
 
 HEADLINES = ("status", "alpha_2", "alpha_2_uncertainty", "alpha_2_predicted", "agrees")
-"""Fields that are printed if a protocol has them; the file contains all fields."""
+"""Main results of a point, which are printed if the protocol has them; the file contains all fields."""
 
 WIDEST = 44
 """Maximum length of a printed value or label [characters]."""
@@ -164,7 +164,7 @@ def _carried_out(
 
 
 def side_by_side(kind: type[Parameters], stored: Sequence[Mapping[str, Any]], new: Sequence[Mapping[str, Any]]) -> str:
-    """Table of recorded and new values: the main results, or every changed field for protocols without them."""
+    """Table of recorded and new values: the main results, or every changed field if a protocol has no main results."""
     fields = kind.model_fields
     labels = list(fields)[:2]
     shown = [name for name in HEADLINES if name in fields]

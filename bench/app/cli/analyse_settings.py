@@ -102,7 +102,7 @@ def choice_of(record: "DataFile", changes: Sequence[str], config: Path | None, s
 
 
 def unusual_of(choice: Choice) -> tuple[str, ...]:
-    """Notices about those unusual settings that differ from the recorded ones."""
+    """Notices about unusual settings, without those that were already unusual in the recording."""
     from bench.config.review import review
     from bench.config.usual import notices_of
 

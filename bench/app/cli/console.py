@@ -1,4 +1,4 @@
-"""The run display on a terminal. No state is shown by colour alone: each one also has a word."""
+"""The run display on a terminal. No state is shown by colour alone: a word also names it."""
 
 import threading
 from collections import deque
@@ -56,7 +56,7 @@ class LiveConsole:
             self._hide()
 
     def prepare(self, phase: str, done: int = 0, total: int = 0, /) -> None:
-        """A `bench.progress.Progress` for the stages before the rig is opened and after it is closed."""
+        """Callback (`bench.progress.Progress`) for the stages before the rig is opened and after it is closed."""
         with self._lock:
             self._scene.prepare(phase, done, total)
         if self._live is None:
@@ -93,7 +93,9 @@ class LiveConsole:
         live.update(picture, refresh=True)
 
     def _print_grave(self) -> None:
-        """Print the lines that remain on the terminal after the display has been removed."""
+        """Print the notices that need the operator's attention; they remain on the terminal after the display has
+        closed.
+        """
         while self._grave:
             self._console.print(log_line(self._grave.popleft()))
 
@@ -178,7 +180,7 @@ def _points(scene: RunDisplay, room: int, wide: bool) -> Table:
         effort = [row.effort] if wide else []
         table.add_row(row.omega, row.beta, row.alpha_2, row.predicted, row.difference, *words, *effort)
     if len(shown) < len(rows):
-        table.title = f"after {len(rows) - len(shown)} earlier points"
+        table.title = f"earlier points not shown: {len(rows) - len(shown)}"
         table.title_justify = "left"
     return table
 

@@ -37,15 +37,16 @@ def devices(
         ),
     ] = (),
     config: Annotated[
-        Path | None, Parameter(metavar="FILE", help="Configuration whose NI server and serial ports are searched.")
+        Path | None,
+        Parameter(metavar="FILE", help="Configuration (TOML) whose device server and serial ports are searched."),
     ] = None,
     as_json: Json = False,
     progress: Handed = silent,
 ) -> int:
     """List the NI devices with their channels and ranges, the lasers on the serial ports, and the rig backends.
 
-    A port is queried at every baud rate; name the ports if other instruments must not be disturbed. The exit code is 0,
-    even if nothing is found, or 2 if an argument is refused.
+    Each port is queried at every baud rate; specify the ports if other instruments must not be disturbed. The exit code
+    is 0, even if nothing is found, or 2 if an argument is refused.
     """
     progress("searching for NI devices")
     if server is not None:
@@ -135,7 +136,7 @@ def _laser_lines(lasers: "list[FoundLaser]", missing: str | None) -> list[str]:
     if missing is not None:
         return ["Serial ports:", f"  none: {missing}"]
     if not lasers:
-        return ["Serial ports:", "  none: plug in the laser adapters and check that their driver is installed"]
+        return ["Serial ports:", "  none: plug in the laser adapters and check that their drivers are installed"]
     return ["Serial ports:", *(f"  {laser.port}: {_laser_text(laser)}" for laser in lasers)]
 
 

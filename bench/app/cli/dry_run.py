@@ -154,7 +154,7 @@ def _margins(margins: "tuple[Margin, ...]") -> str:
 
 
 def tests_text(tests: "Sequence[Queued]") -> str:
-    """One line for each test, and the number of tests at each stage."""
+    """Table with one row for each test, and the number of tests in each state."""
     rows = [
         (str(n + 1), str(test.stage), test.protocol, test.out or ABSENT, test.outcome) for n, test in enumerate(tests)
     ]
@@ -164,12 +164,12 @@ def tests_text(tests: "Sequence[Queued]") -> str:
 
 
 def plans_text(plans: "Sequence[Mapping[str, object]]") -> str:
-    """One line for each plan of a queue, from its `plan_content`."""
+    """Table with one row for each plan of a queue, from its `plan_content`."""
     return text_table(_PLANS, map(_row, plans))
 
 
 def plan_content(number: int, test: "Queued", found: "Preflight") -> dict[str, object]:
-    """The plan of a queued test, for JSON."""
+    """The checked plan of a queued test, as content for JSON."""
     tightest = found.margins[0] if found.margins else None
     return {
         "test": number,

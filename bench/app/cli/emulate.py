@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 _LOOK = 1.0
 """Interval between two checks of the lateness of the emulation [s]."""
 LARGEST_CLOCK_ERROR = 0.01
-"""Largest relative error of an emulated clock, as for the lasers of the virtual bench."""
+"""Largest relative error of an emulated clock; the limit for the lasers of the virtual bench is the same."""
 
 
 def emulate(
@@ -35,7 +35,7 @@ def emulate(
     lasers: Annotated[
         Literal["serial", "socket", "analogue"] | None,
         Parameter(
-            help="Connection of the lasers; socket is the serial line on a network port of this computer.",
+            help="Connection of the lasers; socket replaces the serial line by a network port of this computer.",
             show_default="serial; on Windows socket",
         ),
     ] = None,
@@ -89,7 +89,7 @@ def emulate(
     ] = None,
     progress: Handed = silent,
 ) -> int:
-    """Serve an emulated laboratory: the virtual bench in real time behind the instruments' real protocols.
+    """Serve an emulated laboratory: the virtual bench in real time, accessed through the instruments' protocols.
 
     Prints the configuration of a client, or writes it with --write, then serves the laboratory until Ctrl-C. Serial
     lasers need pseudo-terminals, which exist on Linux and macOS only; use --lasers socket elsewhere.
@@ -133,7 +133,7 @@ def emulate(
             _write_client_configuration(configuration, laboratory, write)
             while not waiting.wait(over, _LOOK):
                 _report_lateness(laboratory)
-            # closed under the same handler, so that a second Ctrl-C does not interrupt the closing
+            # close while the handler is still installed, so that a second Ctrl-C does not interrupt it
             laboratory.close()
     finally:
         laboratory.close()
@@ -158,7 +158,7 @@ def _ratios(typed: tuple[str, str, str]) -> list[float]:
 
 
 def _at_rate(configuration: "BenchConfiguration", rate: str | None) -> "BenchConfiguration":
-    """The configuration with the sample rate of its virtual bench replaced. Raises InvalidInput."""
+    """The configuration with `rate` as the sample rate of its virtual bench, if given. Raises InvalidInput."""
     if rate is None:
         return configuration
     from bench.config.sections import Simulation
@@ -174,7 +174,7 @@ def _at_rate(configuration: "BenchConfiguration", rate: str | None) -> "BenchCon
 
 
 def _with_lead(configuration: "BenchConfiguration", lead: str | None) -> "BenchConfiguration":
-    """The configuration with its lead replaced. Raises InvalidInput."""
+    """The configuration with `lead` as the lead of the drive, if given. Raises InvalidInput."""
     if lead is None:
         return configuration
     from bench.config.sections import Acquisition

@@ -22,7 +22,7 @@ else:
 def info(file: CampaignFile, /, *, as_json: Json = False, progress: Handed = silent) -> int:
     """Describe a data file: how the campaign ended, its channels, runs, points and tables.
 
-    The file may still be in the process of being written. The exit code is 0, or 2 if the file is refused.
+    A file that is still being written can be described too. The exit code is 0, or 2 if the file is refused.
     """
     progress("reading the file")
     from bench.datafile.inspection import overview
@@ -35,7 +35,7 @@ def info(file: CampaignFile, /, *, as_json: Json = False, progress: Handed = sil
 
 
 def verify(file: CampaignFile, /, *, as_json: Json = False, progress: Handed = silent) -> int:
-    """Compare every dataset of a data file with its checksum and with the layout.
+    """Check every dataset of a data file against its checksum and against the file layout.
 
     The exit code is 0 if the file is complete and unchanged, 2 if it is damaged or refused.
     """
@@ -157,7 +157,7 @@ def export(
     if integrity.failing:
         print_warning(f"{file}: {integrity}")
     size = sum(each.stat().st_size for each in written)
-    print(f"{len(written)} files ({size / 1e6:.1f} MB) are in {out}")
+    print(f"Files written: {len(written)} ({size / 1e6:.1f} MB) in {out}")
     return 0
 
 
@@ -191,9 +191,9 @@ def _campaign(content: dict[str, Any]) -> dict[str, Any]:
         "seed": content["seed"],
         "plan": content["plan_hash"],
         "samples": f"{content['samples']} at {content['sample_rate']:g} samples/s: {content['duration']:.1f} s"
-        f" in {len(content['runs'])} runs",
-        "points": f"{content['points']}; {content['events']} events",
-        "tables": ", ".join(f"{name} ({rows} rows)" for name, rows in content["tables"].items()),
+        f"; runs: {len(content['runs'])}",
+        "points": f"{content['points']}; events: {content['events']}",
+        "tables": ", ".join(f"{name} (rows: {rows})" for name, rows in content["tables"].items()),
         "checksums": _checksums(content),
         "recovered": "; ".join(content["recovered"]),
     }
@@ -216,6 +216,6 @@ def _checksums(content: dict[str, Any]) -> str:
     if not content["checksums"]:
         return "none"
     left = content.get("unchecked", 0)
-    wrong = f"{len(content['failing'])} differ" if content["failing"] else "those verified are intact"
+    wrong = f"differing: {len(content['failing'])}" if content["failing"] else "those verified are intact"
     rest = f"; {left} not verified, see `rockbench file verify`" if left else ""
-    return f"{content['checksums']} datasets; {wrong}{rest}"
+    return f"datasets: {content['checksums']}; {wrong}{rest}"

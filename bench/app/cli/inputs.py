@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 P = TypeVar("P", bound=Parameters)
 
 MOST_POINTS = 1_000_000
-"""Maximum number of points: the product of the numbers of values of all ranges; a larger one is probably a typing
+"""Maximum number of points, the product of the numbers of values of all ranges; a larger number is probably a typing
 error.
 """
 
@@ -92,7 +92,7 @@ def with_profile(configuration: "BenchConfiguration", profile: "Profile | None")
 
 
 def request_from(model: type[P], arguments: Mapping[str, Any]) -> P:
-    """The request declared by the flags. Raises InvalidInput."""
+    """The request of type `model` that the flags specify. Raises InvalidInput."""
     wanted = read_fields(model, arguments)
     axes = [name for name in _AXES if name in wanted]
     points = prod(len(wanted[name]) for name in axes)

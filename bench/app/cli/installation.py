@@ -142,7 +142,9 @@ def completion(
             else root.generate_completion(shell=shell)
         )
     except ShellDetectionError:
-        raise InvalidInput("SHELL", "none", "the running shell was not recognised; specify bash, zsh or fish") from None
+        raise InvalidInput(
+            "SHELL", "none", "the running shell was not recognised; specify bash, zsh, fish or powershell"
+        ) from None
     except OSError as error:
         where = "its start-up file" if error.filename is None else Path(error.filename)
         raise InvalidInput("--install", str(where), f"the file cannot be written: {error.strerror}") from None

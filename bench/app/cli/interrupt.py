@@ -1,7 +1,7 @@
 """Handling of Ctrl-C, SIGTERM and a closed terminal in every phase of a command.
 
-While a rig is open, the first signal ends the run in an orderly way and the second cuts the output. Otherwise nothing
-has to be brought to rest: the first signal raises KeyboardInterrupt. If the main thread cannot handle the signal,
+While a rig is open, the first signal ramps the output to zero and ends the run, and the second cuts the output. Without
+an open rig nothing moves, and the first signal raises KeyboardInterrupt. If the main thread cannot handle the signal,
 because it executes native code or waits, another thread ends the process.
 """
 
@@ -116,9 +116,7 @@ def interruptible(requests: "Requests", asking: Callable[[], bool]) -> Generator
 
 @contextmanager
 def leaving() -> Generator[None, None, None]:
-    """Context manager in which SIGINT ends the process at once, provided that `handle_signals` has installed its
-    handler.
-    """
+    """Context manager in which SIGINT ends the process at once, if `handle_signals` has installed a handler before."""
     before = signal.getsignal(signal.SIGINT)
     if not isinstance(before, Interrupts):
         yield
@@ -151,7 +149,9 @@ class Watch:
         threading.Thread(target=self._watch, name="interrupts", daemon=True).start()
 
     def claim(self) -> bool:
-        """Claim the report of the interrupt: True for the first caller, which must report it, False for later ones."""
+        """Claim the report of the interrupt. Returns True to the first caller, which must report it, and False to later
+        ones.
+        """
         return self._unanswered.acquire(blocking=False)
 
     def _watch(self) -> None:
@@ -164,7 +164,7 @@ class Watch:
                     threading.Thread(target=self._end, args=(number,), name="interrupted", daemon=True).start()
 
     def _report_run(self) -> None:
-        texts = ("ending the run: ramping the output to zero; Ctrl-C again cuts it", "cutting the output")
+        texts = ("ending the run: ramping the output to zero; press Ctrl-C again to cut it", "cutting the output")
         if len(self._printed) < len(texts):
             self._printed.append(texts[len(self._printed)])
             self._say(f"rockbench: interrupted: {self._printed[-1]}")
@@ -237,7 +237,7 @@ def leave(code: int) -> NoReturn:
     remove_unfinished()
     with suppress(OSError, ValueError):
         if sys.__stderr__ is not None and sys.__stderr__.isatty():
-            # a progress bar hides the cursor
+            # show the cursor, which a progress bar may have hidden
             sys.__stderr__.write("\x1b[?25h")
             sys.__stderr__.flush()
     os._exit(code)

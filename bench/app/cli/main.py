@@ -61,7 +61,7 @@ COMMANDS = {
     ),
     "emulate": (
         "emulate:emulate",
-        "Serve an emulated laboratory: the virtual bench in real time behind the instruments' real protocols.",
+        "Serve an emulated laboratory: the virtual bench in real time, accessed through the instruments' protocols.",
         "--write lab.toml",
     ),
     "predict modes": (
@@ -132,7 +132,7 @@ COMMANDS = {
     ),
     "file verify": (
         "file:verify",
-        "Compare every dataset of a data file with its checksum and with the layout.",
+        "Check every dataset of a data file against its checksum and against the file layout.",
         "campaign.h5 --json",
     ),
     "file recover": (
@@ -185,7 +185,7 @@ COMMANDS = {
 
 
 def rockbench_app(arguments: Sequence[str] = ()) -> App:
-    """The command tree. Loads only the command, or the list of protocols, that `arguments` name."""
+    """The command tree. Of the commands, only the one that `arguments` name is loaded, or the list of protocols."""
     app = App(
         name="rockbench",
         help=SUMMARY,
@@ -248,7 +248,7 @@ def _version() -> str:
 
 
 def _document(command: App) -> None:
-    """Replace the summary of a command by its documentation, one line per paragraph, which the terminal wraps."""
+    """Replace the summary of a command by its full help, with one line per paragraph, which the terminal wraps."""
     text = getdoc(command.default_command) or ""
     command.help = "\n\n".join(" ".join(paragraph.split()) for paragraph in text.split("\n\n"))
 

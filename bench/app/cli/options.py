@@ -57,7 +57,7 @@ Json = Annotated[
         help="Print one JSON object on standard output and nothing else there.",
     ),
 ]
-Yes = Annotated[bool, switch("Answer yes to the operator's questions: an unattended run.")]
+Yes = Annotated[bool, switch("Answer yes to every question to the operator, for an unattended run.")]
 CampaignFile = Annotated[
     Path, Parameter(name="FILE", metavar="FILE", help="Data file of a campaign (campaign.h5), opened read-only.")
 ]
@@ -73,7 +73,7 @@ RecordText = Annotated[
 
 
 def flag(name: str) -> str:
-    """The flag of a parameter: `--amplitude-factor`."""
+    """The flag of a parameter, such as `--amplitude-factor` for `amplitude_factor`."""
     return "--" + name.replace("_", "-")
 
 
@@ -83,8 +83,8 @@ def with_flags(
     """Add a flag for each field of `model` to a command, in the group `title`; the first argument of the command
     receives the typed values by name.
 
-    Values are passed as text: the model, not the command-line parser, validates them. The field `positional`, a list of
-    texts, becomes a positional argument.
+    Values are passed on as text and validated by the model, not by the command-line parser. The field `positional`, a
+    list of texts, becomes a positional argument.
     """
     group = Group(title, sort_key=1)
     fields = list(declared(model))
@@ -93,7 +93,7 @@ def with_flags(
     placed += [_by_place(entry, group) for entry in fields if entry.name == positional]
     flags = [_argument(entry, group) for entry in fields if entry.name != positional]
 
-    # the names differ from those of the signature: cyclopts would use these annotations instead
+    # cyclopts would use the annotations of equally named arguments instead of those in the signature set below
     def execute(*values: Any, **options: Any) -> int:
         typed = {entry.name: options.pop(entry.name) for entry in fields if entry.name in options}
         if positional is not None:
@@ -208,11 +208,11 @@ class RunOptions:
     realtime: Annotated[bool, switch("Run the simulated bench in real time instead of as fast as possible.")] = False
     watch: Annotated[
         bool,
-        switch("Serve a read-only live page of the run, like `rockbench watch`; the first line names its address."),
+        switch("Serve a read-only live page of the run, like `rockbench watch`; the first line states its address."),
     ] = False
     json: Annotated[
         bool,
-        switch("Print one JSON object, the summary of the run or its margins, on standard output, and nothing else."),
+        switch("Print only one JSON object on standard output: the summary of the run, or its margins."),
     ] = False
 
     @property

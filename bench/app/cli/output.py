@@ -1,6 +1,5 @@
-"""Output of the commands: results as text, JSON, CSV, HDF5 and figure; errors and warnings as lines.
-
-The names of files are checked before anything is computed.
+"""Output of the commands: results as text, JSON, CSV, HDF5 and figure; errors and warnings as lines.  The names of the
+output files are checked before anything is computed.
 """
 
 import json
@@ -137,7 +136,7 @@ def check_files(options: "ResultOptions") -> None:
         if other != item:
             raise InvalidInput(item, str(path), f"{other} would write the same file; choose another name")
         try:
-            # permission bits are not reliable on every file system
+            # try to create a file, because permission bits are not reliable on every file system
             with tempfile.TemporaryFile(dir=path.parent):
                 pass
         except OSError as error:
@@ -186,7 +185,7 @@ def _write(result: Result, options: "ResultOptions", progress: Progress) -> None
 
 
 def columns_text(table: "Table", headings: Mapping[str, str]) -> str:
-    """Text table of the columns that are keys of `headings`, each under its heading."""
+    """Text table of the columns named by the keys of `headings`, each under its heading."""
     columns = [
         TextColumn(heading, "" if (unit := table[name].unit) == "1" else unit) for name, heading in headings.items()
     ]

@@ -82,8 +82,8 @@ def _sine(
     documentation: str,
     drawable: int | None = None,
 ) -> "Callable[..., int]":
-    """A command with the flags of a request, computed by a `function` of this package, as "module:name". Its figure can
-    hold `drawable` points.
+    """A command with the flags of `request_type`, whose result `function` ("module:name" in this package) computes. Its
+    figure shows at most `drawable` points.
     """
 
     def command(
@@ -124,7 +124,7 @@ def _check_scheduler(request: Parameters) -> None:
 
 
 def _unfinished(options: ResultOptions) -> "Path | None":
-    """Folder for an unfinished result, in the folder of its first file; None without files."""
+    """Folder for an unfinished result, next to the file of --out or --csv; None without such a file."""
     path = options.out or options.csv
     return None if path is None else path.with_name(f".{path.name}.unfinished")
 
@@ -132,8 +132,8 @@ def _unfinished(options: ResultOptions) -> "Path | None":
 def _under_records(
     request_type: type[RecordsRequest], function: str, documentation: str, drawable: int
 ) -> "Callable[..., int]":
-    """A command with the flags of a request for records, computed by a `function` of `predict_seismic`. Its figure can
-    hold `drawable` records.
+    """A command with the flags of `request_type`, whose result `function` of `predict_seismic` computes. Its figure
+    shows at most `drawable` records.
     """
 
     def command(
@@ -178,17 +178,17 @@ history = _sine(
     "predict_sine:history",
     "Time histories of drift, u1 and theta, with the sine switched on at rest or in the steady state.\n\n"
     "From rest the block may overturn even where the steady motion is stable; the history then ends at that time and "
-    "is marked. With --steady: whole periods of each steady motion that exists. The figure is like the paper's Fig. "
-    "5.",
+    "is marked. With --steady, whole periods of every existing steady motion are computed. The figure is like the "
+    "paper's Fig. 5.",
 )
 steady = _sine(
     SteadyRequest,
     "predict_sine:steady",
     "Steady motions at single points: gain coefficients, peaks, impacts, Floquet multipliers.\n\nThe "
     "periodic motions are solved for directly, without waiting for transients to decay. Up to two exist "
-    "at a point: the block rocks, or it never lifts. Each is listed, and its alpha_2 has an uncertainty "
-    "band: expanded uncertainty (k = 2) to first order, or the 95 % interval of a Monte Carlo simulation "
-    "with --members. The figure shows two periods of each.",
+    "at a point: one in which the block rocks, and one in which it never lifts. Each is listed, and its "
+    "alpha_2 has an uncertainty band: expanded uncertainty (k = 2) to first order, or the 95 % interval of "
+    "a Monte Carlo simulation with --members. The figure shows two periods of each.",
     drawable=MOST_HISTORIES,
 )
 spectrum = _sine(
@@ -208,17 +208,17 @@ stability = _sine(
     "predict_on_table:stability",
     "Stability boundaries of the rocking motions in frequency, on fixed ground and on a table.\n\nThe block pushes "
     "the table, which changes how a disturbance grows or decays: a motion may be stable on the table and unstable on "
-    "fixed ground. Up to the harmonic --harmonics, the table's motion is a pure sine; the drive does not react within "
-    "a period. The boundaries are listed; --csv, --json and --plot contain the multipliers of every point.",
+    "fixed ground. The drive keeps the table's motion a pure sine up to the harmonic --harmonics, but does not react "
+    "within a period. The boundaries are listed; --csv, --json and --plot contain the multipliers of every point.",
 )
 attractor = _sine(
     AttractorRequest,
     "predict_on_table:attractor",
     "Long-term motions on a table, where the periodic rocking motion is unstable: period, peaks, falls.\n\nThe motion "
-    "is simulated from the disturbed orbit over --cycles cycles; the drive keeps the mean of the table's harmonics. "
-    "The motion repeats after several cycles, does not repeat, or ends with a fall. The range of the greatest peak and "
-    "the share of falls are computed with randomly drawn specimens. With many frequencies the figure is a bifurcation "
-    "diagram.",
+    "is simulated from the disturbed orbit over --cycles cycles; the drive keeps the table's harmonics at their "
+    "requested values on average. The motion repeats after several cycles, does not repeat, or ends with a fall. "
+    "The range of the greatest peak and the share of falls are computed with randomly drawn specimens. With many "
+    "frequencies, the figure is a bifurcation diagram.",
 )
 seismic = _under_records(
     SeismicRequest,
@@ -233,6 +233,6 @@ band_study = _under_records(
     BandStudyRequest,
     "band_study",
     "Gain and toppling under earthquake records, against the lower end of the table's band.\n\nLike `seismic`, with "
-    "each record limited to every band and scaled to the same peak in it. The figure has a panel for each record.",
+    "each record limited to each band in turn and scaled to the same peak. The figure has a panel for each record.",
     drawable=15,
 )

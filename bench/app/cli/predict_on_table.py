@@ -54,12 +54,12 @@ def stability(request: StabilityRequest, subject: Subject, progress: Progress) -
     points = multipliers_table(subject.specimen, shaker, request, progress)
     print_lost(len(request.omega) * len(request.beta) - points["beta"].values.size)
     if missing := int(np.isnan(points["table_modulus"].values).sum()):
-        print(f"rockbench: the shaker cannot move this table as requested at {missing} points", file=sys.stderr)
+        print(f"rockbench: points at which the shaker cannot move this table as requested: {missing}", file=sys.stderr)
     boundaries = boundaries_table(subject.specimen, shaker, request, points, progress)
 
     def text() -> str:
         if not boundaries["beta"].values.size:
-            return "no stability boundary lies in the range"
+            return "there is no stability boundary in the range"
         return columns_text(boundaries, _BOUNDARIES)
 
     def figure() -> "Figure":
@@ -107,6 +107,6 @@ def attractor(request: AttractorRequest, subject: Subject, progress: Progress) -
 
 
 def _shaker(request: OnTableRequest, subject: Subject) -> Shaker:
-    """Shaker of the simulated bench, with the requested mass."""
+    """Shaker of the simulated bench, with the moving mass of the request, if given."""
     shaker = subject.configuration.simulation.bench.shaker
     return shaker if request.table_mass is None else shaker.model_copy(update={"moving_mass": request.table_mass})

@@ -139,7 +139,7 @@ def _result(
 
 
 def _band_curve(curves: Sequence[SeismicCurve], k: int) -> BandCurve:
-    """One record at its k-th stiffness, over the bands."""
+    """Gains of one record at its k-th stiffness, against the lower end of the band."""
     gains = [curve.gains[k] for curve in curves]
     bands = [curve.prepared.band or (nan, nan) for curve in curves]
     return BandCurve(

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from bench.figures.map_figure import BranchGrid
 
 MOST_SPECTRA = 12
-"""Maximum number of stiffnesses with separate lines."""
+"""Maximum number of stiffnesses with separate rows in the summary."""
 
 _MODES = {
     "system": "system",
@@ -143,7 +143,7 @@ def spectrum(request: SpectrumRequest, subject: Subject, progress: Progress) -> 
 
 
 def gain_map(request: MapRequest, subject: Subject, progress: Progress) -> Result:
-    """Gain maps."""
+    """Gain maps over frequency and stiffness; with an output file, an interrupted map is continued."""
     from bench.prediction.gain_map import grids, map_table, resting_margin
     from bench.prediction.map_store import MapStore, discard
 
@@ -166,7 +166,7 @@ def gain_map(request: MapRequest, subject: Subject, progress: Progress) -> Resul
         except (KeyboardInterrupt, RockbenchError, OSError):
             for each in stores:
                 if each.after is not None:
-                    rows = f"{each.after.rows} of {len(request.beta)} rows are complete"
+                    rows = f"complete rows: {each.after.rows} of {len(request.beta)}"
                     print(f"rockbench: {rows}; the same command continues the map", file=sys.stderr)
                 each.close()
             raise
@@ -190,7 +190,7 @@ def gain_map(request: MapRequest, subject: Subject, progress: Progress) -> Resul
     found = _result("gain maps", request, subject, table, lambda: extremes(table), figure)
     if stores:
         return replace(found, close=stores[0].remove)
-    # rows of an earlier, larger map with the same name
+    # an earlier, larger map with the same name may have left rows
     return found if subject.unfinished is None else replace(found, close=partial(discard, subject.unfinished))
 
 

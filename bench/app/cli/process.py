@@ -40,7 +40,7 @@ def run() -> None:
     except BaseException:
         if interrupts.first is None:
             raise
-        # an interrupt that a library has converted into an error of its own
+        # a library has converted the interrupt into an error of its own
         report_interrupt()
         code = 130
     if interrupts.exit_code is not None or code == 130:
@@ -75,7 +75,7 @@ def _carry_out() -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         code = 1
     except OSError as error:
-        # such as a full disk behind standard output
+        # for example, standard output is a file on a full disk
         print_error(error)
         code = 1
     return code
@@ -103,7 +103,7 @@ class PhaseLines:
 
 
 class PhaseBar:
-    """Draws phase, bar and expected end on a terminal; the bar is hidden while other text is written.
+    """Draws phase, bar and remaining time on a terminal; the bar is hidden while other text is written.
 
     A context manager, which replaces standard output and error by streams that hide the bar before they write.
     """

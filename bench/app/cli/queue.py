@@ -51,7 +51,7 @@ def queue(
     configuration = configuration_from(config, seed, specimen)
     if not file.exists():
         raise InvalidInput(ITEM, str(file), "there is no such file; `rockbench run PROTOCOL --queue FILE` creates one")
-    # listing the queue does not lock it
+    # a dry run does not lock the queue
     with nullcontext() if dry_run else owned(file, "`rockbench queue`"):
         store = QueueFile(file)
         tests = Queue(store.read(), store.write)
@@ -105,7 +105,7 @@ def _refusal(found: "dict[int, Preflight]") -> InvalidInput | None:
 def _run_all(tests: "Queue", configuration: "BenchConfiguration", yes: bool, prepared: "dict[int, Ready]") -> int:
     """Run the pending tests until one does not complete; returns the exit code."""
     while (index := tests.next) is not None:
-        # plans are kept only while needed
+        # each plan is dropped when its test has ended
         code = _run_one(tests, index, configuration, yes, prepared.pop(index, None))
         if code is not None:
             return code

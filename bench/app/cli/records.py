@@ -20,7 +20,7 @@ MOST_DRAWN = 8
 """Maximum number of records in a figure."""
 
 SHORTEST, LONGEST = 0.05, 5.0
-"""Periods of the response spectrum [s]."""
+"""Shortest and longest period of the response spectrum [s]."""
 
 
 def info(
@@ -86,7 +86,7 @@ def info(
 
 
 def _content(record: "Accelerogram") -> dict[str, Any]:
-    """A record for JSON: SI units, named at the end of each key."""
+    """Content of a record for JSON, in SI units, which the keys state at their end."""
     from bench.accelerograms.measures import measures
 
     found = measures(record)

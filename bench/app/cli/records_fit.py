@@ -80,7 +80,7 @@ fit = with_flags(StrokeFitRequest, "Parameters of fit", _fit)
 
 
 def _content(fits: "StrokeFits") -> dict[str, Any]:
-    """The fits for JSON: SI units, named at the end of each key."""
+    """Content of the fits for JSON, in SI units, which the keys state at their end."""
     record = fits.record
     first = fits.chosen.fit
     return {
@@ -109,7 +109,7 @@ def _content(fits: "StrokeFits") -> dict[str, Any]:
 
 
 def _text(fits: "StrokeFits") -> str:
-    """The fits as text."""
+    """The fits as text: preparation of the record, limits, a table with one row for each fit, and remarks."""
     motion_columns = (("peak", "m/s2"), ("velocity", "m/s"), ("stroke", "mm"), ("end", "mm"))
     changes = [*(f"at {period:.3g} s" for period in fits.own), "rms", "most"]
     columns = [
@@ -132,7 +132,7 @@ def _text(fits: "StrokeFits") -> str:
             "",
             text_table(columns, rows),
             "",
-            "changes of the response spectrum: at the periods of the frame, and from 0.1 to 2 s",
+            "changes of the response spectrum: at the periods of the frame; rms and most from 0.1 to 2 s",
             *(f"{method}: {motion.fit.done}" for method, motion in fits.fitted.items() if motion.fit is not None),
             *(f"{method}: {reason}" for method, reason in fits.refused.items()),
         ]

@@ -30,7 +30,10 @@ def replay(
     /,
     *,
     speed: Annotated[
-        str, Parameter(metavar="FACTOR", help="Speed: 1 for real time, 10 for ten times as fast, or max.")
+        str,
+        Parameter(
+            metavar="FACTOR", help="Speed: 1 for real time, 10 for ten times as fast, max for as fast as possible."
+        ),
     ] = MAX,
     as_json: Json = False,
     progress: Handed = silent,
@@ -112,7 +115,7 @@ def _text(replayed: "Replayed", table: str) -> str:
     if replayed.ended is not None:
         lines.append(f"The recording is incomplete: {replayed.ended}")
     lines += [
-        f"This reason cannot be reproduced from the samples and was replaced by a requested abort: {reason}"
+        f"The samples do not reproduce this cause of the end; the replay requested an abort instead: {reason}"
         for reason in replayed.in_place
     ]
     compared = ", ".join(_counted(count, part) for part, count in replayed.found.compared.items() if count)
@@ -121,7 +124,7 @@ def _text(replayed: "Replayed", table: str) -> str:
     if not replayed.same_intervals:
         lines.append("The file is from an older version; its uncertainties were not compared")
     if replayed.identical:
-        there = " up to its end" if replayed.ended is not None else ""
+        there = " up to its last sample" if replayed.ended is not None else ""
         lines.append(f"Bit-identical to the file{there}: {compared}")
         return "\n".join(lines)
     differences = sorted(replayed.found.differences, key=lambda each: each.rounding)

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from bench.document.document import Document
 
 HTML = Annotated[Path | None, Parameter(name="--html", metavar="OUT", help="Write the report as one HTML file.")]
-PDF = Annotated[Path | None, Parameter(name="--pdf", metavar="OUT", help="Write the report as PDF, A4.")]
+PDF = Annotated[Path | None, Parameter(name="--pdf", metavar="OUT", help="Write the report as a PDF in A4 format.")]
 OVERWRITE = Annotated[
     bool,
     switch("Replace existing files."),
@@ -162,7 +162,7 @@ def _check_outputs(html: Path | None, pdf: Path | None, *, overwrite: bool) -> N
 def _deliver(
     document: "Document", html: Path | None, pdf: Path | None, *, overwrite: bool, progress: Progress = silent
 ) -> int:
-    """Write a report in the requested formats; returns 0, or 1 with a line on standard error."""
+    """Write a report in the requested formats; returns 0, or 1 with an error line on standard error."""
     from bench.document.rendering import html_page, write_pdf
     from bench.unfinished import write_new
 

@@ -41,7 +41,7 @@ def __getattr__(name: str) -> App:
     try:
         protocol = load_protocol(name)
     except InvalidInput as refused:
-        # reported when the protocol is listed or run, so that the others stay usable
+        # report the error only when this protocol is listed or run, so that the others stay usable
         failure = refused
     else:
         command = name if name == CHECK else f"run {name}"
@@ -84,7 +84,9 @@ def _run(
         raise InvalidInput("--watch", None, "--address, --port and --no-token need the live page: add --watch")
     if options.watch and (options.dry_run or options.queue is not None):
         raise InvalidInput(
-            "--watch", True, "--dry-run and --queue start no run to show; omit --watch, or omit --dry-run and --queue"
+            "--watch",
+            True,
+            "--dry-run and --queue start no run that it could show; omit --watch, or omit --dry-run and --queue",
         )
     from bench.app.cli.inputs import configuration_from, parameters_from, with_profile
     from bench.app.cli.terminal import choose
@@ -238,7 +240,9 @@ def carry_out(
         except KeyboardInterrupt:
             # a summary exists only after a run: `check_folder` refuses a folder that already contains one
             if (out / SUMMARY).exists():
-                raise KeyboardInterrupt(f"interrupted after the run: {out} has its results, without figures") from None
+                raise KeyboardInterrupt(
+                    f"interrupted after the run: {out} contains its results, without figures"
+                ) from None
             raise KeyboardInterrupt("interrupted before anything moved") from None
         except (RockbenchError, OSError) as error:
             ended = error
@@ -263,7 +267,7 @@ def _print_result(result: "SessionResult", out: Path, as_json: bool, interrupted
 
 
 def _error(result: "SessionResult") -> tuple[str | None, Code]:
-    """The error for the JSON object of a run, None if the run ended well, and its code."""
+    """The error of a run for its JSON object, None if the run ended well, and the code of the error."""
     if result.status not in GOOD:
         return result.reason, "run_failed" if result.status == "failed" else "run_aborted"
     return None if result.passed else "at least one check failed: see the points", "check_failed"

@@ -1,4 +1,4 @@
-"""Standard error that outlasts its reader, so that a run continues without a display."""
+"""Standard error that tolerates the loss of its reader, so that a run continues without a display."""
 
 import os
 import sys
@@ -46,5 +46,5 @@ class _Lasting:
 
 
 def lasting(stream: TextIO) -> TextIO:
-    """The wrapped stream, with errors ignored."""
+    """`stream` wrapped so that its write errors are ignored."""
     return stream if isinstance(stream, _Lasting) else cast(TextIO, _Lasting(stream))

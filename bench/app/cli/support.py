@@ -28,7 +28,7 @@ def doctor(
     """Check whether this computer can run a bench: versions, clocks, disk, power settings, serial ports and graphics,
     with remedies.
 
-    Nothing is changed and no device is opened. The exit code is 0, or 1 if a check is bad.
+    Nothing is changed and no device is opened. The exit code is 0, 1 if a check is bad, or 2 if an argument is refused.
     """
     progress("checking the computer")
     from bench.app.support.doctor import Health, examine
@@ -71,8 +71,8 @@ def bundle(
 ) -> int:
     """Collect a fault report: log, configuration, versions and latest data of a campaign in one archive.
 
-    The data cover the last minute. A part of a damaged file that cannot be read is replaced by the reason. The exit
-    code is 0, or 2 if the archive is refused.
+    The data cover the last minute. If a part of the file cannot be read, the archive states the reason in its place.
+    The exit code is 0, or 2 if the archive is refused.
     """
     progress("collecting the report")
     from bench.app.support.bundle import write_bundle

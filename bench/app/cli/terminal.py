@@ -39,7 +39,7 @@ class PlainLines:
         self._stream.flush()
 
     def prepare(self, phase: str, done: int = 0, total: int = 0, /) -> None:  # noqa: ARG002 - a line for each phase
-        """A `bench.progress.Progress` for the stages before the rig is opened and after it is closed."""
+        """Callback (`bench.progress.Progress`) for the stages before the rig is opened and after it is closed."""
         if phase != self._phase:
             self._phase = phase
             self._write(self._scene.time, f"{self._stage}{one_line(phase)}")
@@ -56,7 +56,7 @@ class PlainLines:
 
 
 class LogLines(PlainLines):
-    """Writes events, and each completed point in the format of `protocol`."""
+    """Writes one line for each event, and each completed point in the log format of `protocol`."""
 
     _stage = "plan: "
 

@@ -251,7 +251,7 @@ def test_what_columns_need(refuse: Refuse) -> None:
 def test_files_that_are_no_records(refuse: Refuse, tmp_path: Path) -> None:
     assert "unrecognised file format" in refuse(["Dear reader,", "this is a letter", "of 3 lines"])
     assert "every sample is zero" in refuse(["0.0", "0.0"], unit="g", dt=0.01)
-    assert "two finite samples" in refuse(["0.5"], unit="g", dt=0.01)
+    assert "two samples, all of them finite" in refuse(["0.5"], unit="g", dt=0.01)
     for name, content, word in (("a", b"", "empty"), ("b", b"\x00\x01", "text"), ("c", b" \r\n", "empty")):
         (tmp_path / name).write_bytes(content)
         with pytest.raises(InvalidInput, match=word):

@@ -218,7 +218,7 @@ def test_values_that_scatter_more_than_they_promise_are_not_better_known_for_it(
         (6.0, {}, "did not come to rest"),
         (None, {"lost": True}, "no valid reading at 3.00 s"),
         (None, {"still": True}, "was upright"),
-        (None, {"least": 0.05}, "impacts are large enough"),
+        (None, {"least": 0.05}, "sufficiently large impacts"),
     ],
 )
 def test_what_is_no_free_rocking_is_told(seconds: float | None, changed: dict[str, object], says: str) -> None:

@@ -44,7 +44,7 @@ def test_a_map_continues_where_it_was_interrupted(tmp_path: Path, capsys: pytest
                 raise KeyboardInterrupt
 
     assert main(outputs("broken"), progress=interrupt) == 130
-    assert "16 of 23 rows are complete; the same command continues the map" in capsys.readouterr().err
+    assert "complete rows: 16 of 23; the same command continues the map" in capsys.readouterr().err
     assert all(done <= total for done, total in told)
     assert told == sorted(told)
     assert files(tmp_path) == {"whole.h5", "whole.csv", ".broken.h5.unfinished"}

@@ -161,7 +161,7 @@ def test_a_block_that_hardly_rocks_is_told_and_the_table_unlocked(tmp_path: Path
     assert (result.status, "no tilt was usable" in result.reason) == ("failed", True)
     told = [event.text for event in events if isinstance(event, Warned)]
     assert len(told) == 2 * SHORT.attempts
-    assert all("impacts are large enough" in text for text in told)
+    assert all("sufficiently large impacts" in text for text in told)
     asked = [event.request for event in events if isinstance(event, OperatorAsked)]
     assert asked[-1] == "Remove the clamps from the table."
     assert any(text.startswith("The last recording was not usable.") for text in asked)

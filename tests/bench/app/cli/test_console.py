@@ -110,7 +110,7 @@ def test_many_points_leave_the_picture_within_the_terminal():
     events: list[Event] = [PointFinished(STEADY, time=0.0) for _ in range(60)]
     lines = rendered(scene_after([*CAMPAIGN, *events]), height=30)
     assert len(lines) <= 30
-    assert line_with(lines, "earlier points")
+    assert line_with(lines, "earlier points not shown")
     assert line_with(lines, "45 %")
 
 
