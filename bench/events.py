@@ -41,7 +41,7 @@ class Event:
     """
 
     table: ClassVar[str] = ""
-    """Path of its columns in the data file, below /entry; empty for an event that is stored only in the journal."""
+    """Path of the table of its columns in the data file, below /entry; empty for an event without such a table."""
     journalled: ClassVar[bool] = True
     """Whether the event is written to the journal; frequent events are not."""
     notice: ClassVar[str] = ""
@@ -53,7 +53,7 @@ class Event:
 
     @property
     def line(self) -> str:
-        """Line for the journal."""
+        """Text of the event in the journal."""
         names = (each.name for each in fields(self) if each.name != "time")
         return ", ".join(f"{name} = {getattr(self, name)}" for name in names)
 
@@ -165,7 +165,7 @@ class StepStarted(Event):
 
 @event(journalled=False)
 class Progress(Event):
-    """Completed fraction of the campaign (0 to 1), present step, and estimated remaining bench time [s]."""
+    """Completed fraction of the campaign (0 to 1), current step, and estimated remaining bench time [s]."""
 
     fraction: float
     remaining: float

@@ -1,4 +1,4 @@
-"""Typography of a report: numbers with uncertainties, symbols, units, dates, counted nouns."""
+"""Typography of a report: numbers with uncertainties, symbols, units, dates, singular and plural nouns."""
 
 import re
 from datetime import datetime, timedelta
@@ -47,7 +47,7 @@ _SUFFIX = re.compile(r"_(?:rad_s|rad|n_m|m_s2|hz)$")
 """Units at the end of the name of a field."""
 
 _SMALL = re.compile(r"(?<=\d )u(?=[ms](?:\W|$))")
-"""The prefix of micrometres and microseconds."""
+"""The letter u as the prefix micro, in micrometres and microseconds."""
 
 
 def plain(value: float | None, digits: int = 4) -> str:
@@ -71,14 +71,14 @@ def with_uncertainty(value: float | None, uncertainty: float | None) -> str:
 
 
 def percent(share: float | None, places: int = 2) -> str:
-    """A ratio in percent, with its sign."""
+    """A ratio in percent, with its sign; a dash if absent."""
     if share is None or not isfinite(share):
         return ABSENT
     return f"{100.0 * share:+.{places}f}".replace("-", MINUS)
 
 
 def yes_or_no(value: bool | None) -> str:
-    """A Boolean as a word."""
+    """A Boolean as the word yes or NO; a dash if absent."""
     return ABSENT if value is None else "yes" if value else "NO"
 
 

@@ -75,7 +75,7 @@ class Loop:
 
     def signals(self) -> tuple[NDArray[np.float64], bool]:
         """Run one iteration. Returns signals, shape (block, len(SIGNALS)), and whether the rocking block has fallen."""
-        # missing samples of a further channel must not invalidate the plan's cycles
+        # only the standard signals: missing samples of an additional channel must not invalidate the plan's cycles
         signals = self.exchange().signals[:, : len(SIGNALS)]
         return signals, self.fall is not None and self.fall.fallen(signals)
 
@@ -98,7 +98,9 @@ class Loop:
         return fell
 
     def ramp_out(self, way: State, reason: str, cause: Cause = UNKNOWN) -> bool:
-        """Bring the output to zero along the ramp for `way` and stop the rig. Returns whether the block fell."""
+        """Ramp the output to zero, fast if `way` is ABORTING, otherwise smoothly, and stop the rig. Returns whether the
+        block fell. Halts the bench if the table still exceeds a limit at the end.
+        """
         begin = self._guard.abort if way is State.ABORTING else self._guard.stop
         begin()
         if self.output.state is not way:
@@ -171,14 +173,16 @@ class AtRest:
             State.STOPPING, "the acquisition at rest is complete" if violation is None else str(violation)
         )
         alignments: tuple[Alignment, ...] = ()
-        # the end of the run reports such a failure
+        # if this fails, `rest` publishes a warning
         with suppress(RockbenchError):
             alignments = self._rig.alignments
         output.rest()
         return RestSamples(self._rig.channels, np.concatenate(counts), violation, alignments)
 
     def _stillness(self, step: Arm) -> NDArray[np.float64]:
-        """Channel values over an interval with the storeys at rest, shape (n, n_channels)."""
+        """Channel values, shape (n, n_channels), of the first interval in which the storeys are still, or of the last
+        one if they are still moving after `patience`.
+        """
         waited = 0.0
         while True:
             blocks = [self._loop.exchange() for _ in range(self._blocks(step.rest))]

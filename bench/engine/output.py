@@ -93,7 +93,7 @@ class DriveSource:
             )
         if self.oscillator.amplitude != 0.0 or self.oscillator.remaining > 0:
             asked = f"{self.oscillator.amplitude:g} m/s2"
-            raise InvalidInput("prepared drive during a sine of", asked, "ramp the sine to zero first")
+            raise InvalidInput("sine amplitude before a prepared drive", asked, "ramp the sine to zero first")
         self.require_silence("another prepared drive")
 
     def require_silence(self, wanted: str) -> None:
@@ -163,7 +163,7 @@ class Output:
         self.drive = np.zeros(0)
         """Drive [V] played while the last block was acquired, shape (block,)."""
         self.read = 0
-        """Samples read since the rig was armed."""
+        """Number of samples read since the rig was armed."""
         self._run = 0
         self.stalls: Stalls | None = None
         """Detector of stalls, periods in which the program did not run; None in virtual time."""
@@ -263,7 +263,7 @@ class Output:
             return ended.ending
         except RigError as error:
             if self._requests.strongest == "halt" and self.driven:
-                # the requesting thread cut the rig during the iteration
+                # the requesting thread cut the enable line during the iteration
                 return self.cut(Ending("halted", self._requests.reason, self._requests.cause))
             return self.cut(Ending.failed(error))
         except RockbenchError as error:
@@ -275,7 +275,9 @@ class Output:
         return None
 
     def rescue(self, error: BaseException, lasts: Sequence[Callable[[], object]]) -> None:
-        """Cut the output before `error` is raised, then call each of `lasts`. Further errors become its notes."""
+        """Cut the output before `error` is raised, then call each of `lasts`. Further errors are added to `error` as
+        notes.
+        """
         ending = Ending("failed", f"{type(error).__name__} in the plan or a subscriber")
         for last in (lambda: self.cut(ending), *lasts):
             try:

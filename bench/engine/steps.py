@@ -63,7 +63,7 @@ class Calibrate:
 
 @dataclass(frozen=True)
 class Sweep:
-    """Sweep along `segments` from the present sine. Returns `Fallen` as soon as the block has fallen, else `Done`."""
+    """Sweep along `segments` from the current sine. Returns `Fallen` as soon as the block has fallen, else `Done`."""
 
     segments: tuple[Segment, ...]
 
@@ -85,7 +85,7 @@ class SetHarmonics:
     """Change smoothly to `shares`: complex fractions of the set amplitude for the fundamental, second harmonic and so
     on, as in `bench.control.oscillator`. A `Sweep` resets them.
 
-    The change lasts `blend` cycles. It begins at the start of cycle number `cycle` of the present count, or at once if
+    The change lasts `blend` cycles. It begins at the start of cycle number `cycle` of the current count, or at once if
     `cycle` is None or that cycle has begun.
     """
 
@@ -169,7 +169,7 @@ class RestSamples:
     """Counts of all inputs with the output at zero, shape (n, n_channels).
 
     `violation` is the exceeded limit that ended the acquisition, if any; the plan continues. `alignments` are those of
-    the sensors with their own clocks, at its end.
+    the free-running sensors to the sample clock at the end of the acquisition.
     """
 
     channels: tuple[Channel, ...]

@@ -78,8 +78,8 @@ class GainCurve:
 
 @dataclass(frozen=True, eq=False)
 class BandCurve:
-    """alpha_2 for one record and stiffness against the lower end of the band, `corner` [Hz], ascending; each of shape
-    (n,).
+    """alpha_2 under one record at one stiffness against `corner`, the lower end of the frequency band [Hz], in
+    ascending order; each of shape (n,).
 
     NaN where the run ended early; `toppled` is True where the block fell.
     """

@@ -47,7 +47,7 @@ def new_figure(width: float, height: float) -> "Figure":
 
 
 def write_figure(path: Path, figure: "Figure") -> None:
-    """Saves in the format of the suffix: PNG at 200 dpi, PDF or SVG.
+    """Saves a figure in the format given by the suffix of `path`: PNG at 200 dpi, PDF or SVG.
 
     Raises InvalidInput if `path` exists and RockbenchError if it cannot be written.
     """

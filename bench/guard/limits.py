@@ -125,7 +125,7 @@ def ramp_refusal(limits: Limits, ramps: Ramps) -> InvalidInput | None:
     if steepest <= limits.drive_slew:
         return None
     slew = f"limits.drive_slew = {limits.drive_slew:g} V/s"
-    needs = f"a ramp from {limits.drive_voltage:g} V needs {steepest:.0f} V/s, but {slew}"
+    needs = f"a ramp from {limits.drive_voltage:g} V needs {steepest:.0f} V/s, but {slew}: lengthen the ramp"
     return InvalidInput("ramps.abort", shortest, needs)
 
 

@@ -60,7 +60,7 @@ def bands(
     for orbit in orbits:
         if orbit.specimen not in of:
             of[orbit.specimen] = _members(orbit.specimen, known, members)
-    # pad with the specimen itself: with a quantity that is exact for one spring only, the numbers of members differ
+    # pad with the specimen itself: if a quantity is exact for only some of the springs, the numbers of members differ
     most = max(map(len, of.values()), default=0)
     own = [of[orbit.specimen] + [orbit.specimen] * (most - len(of[orbit.specimen])) for orbit in orbits]
     gains = steady_gains(orbits, own, done=done, scheduler=scheduler)[:, :, 1]
