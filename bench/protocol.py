@@ -32,7 +32,7 @@ P = TypeVar("P", bound=Parameters)
 T = TypeVar("T")
 
 Sources: TypeAlias = Mapping[str, Mapping[str, "Column"]]
-"""Tables of a data file, by name."""
+"""Tables of a data file by name, each with its columns by name."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -86,7 +86,7 @@ class SpectrumRequest(GainRequest):
 
 
 class MapRequest(GainRequest):
-    """Gain over frequency and stiffness."""
+    """Gain on a grid of frequencies and stiffnesses."""
 
     omega: tuple[Frequency, ...] = _frequencies(spaced("12", "21", 100), least=2)
     beta: tuple[Stiffness, ...] = _stiffnesses(spaced("0.1", "1.2", 100), least=2)

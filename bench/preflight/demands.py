@@ -156,8 +156,8 @@ def load(
 
 
 def _heating(current: Array, held: float, time: float) -> float:
-    """Largest rms current, the root of the exponentially weighted mean of current^2 / 2, with the last amplitude held
-    for `held` [s].
+    """Largest rms current [A], the root of the exponentially weighted mean of current^2 / 2, with the last amplitude
+    held for `held` [s].
     """
     power = 0.5 * current**2
     mean, _ = exponential_mean(power, float(np.exp(-STEP / time)))
@@ -248,7 +248,7 @@ UNPROBED = {
 
 
 def demands_of(known: Mapping[str, float], where: str, configuration: BenchConfiguration) -> tuple[Demand, ...]:
-    """Demands on all limited quantities in the decisive part `where` of a run that itself probes its table."""
+    """Demands on all limited quantities of a run that itself probes its table; `where` names the decisive part."""
     return tuple(
         Demand(quantity, known[quantity], None, where)
         if quantity in known

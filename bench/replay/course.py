@@ -1,4 +1,4 @@
-"""The recorded course of a run: its journal with typed columns, requests to end it, open inputs, alignments."""
+"""Recorded course of a run: journal with typed columns, requests to end the run, open safety inputs, alignments."""
 
 from collections import deque
 from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -85,7 +85,7 @@ class RecordedCourse:
                 self._opened[run] = int(ends[entry.blocks - 1]), entry.columns["subject"].split(", ")
 
     def rows_of(self, path: str) -> Sequence[Mapping[str, Any]] | None:
-        """Rows of the table at `path`, which is that of a reproducible event; None if the file has no such table."""
+        """Rows of the table at `path`, whose event a replay reproduces; None if the file has no such table."""
         for kind, table in ENTRY_TABLES.items():
             if table.path == path:
                 return self._rows.get(kind.__name__)

@@ -68,7 +68,7 @@ class RunRecording:
 class DataFileRecording:
     """Open file as a `drivers.replay.Recording`; the caller closes the file.
 
-    Raises InvalidInput for a file without the configuration of its bench, or one that this software cannot read.
+    Raises InvalidInput if the file has no configuration of its bench, or one that this software cannot read.
     """
 
     def __init__(self, record: DataFile) -> None:

@@ -101,9 +101,9 @@ class Replayed:
 
     `ended` states where and why the recording broke off before the end of the plan: an error of the rig, or the end of
     a killed program, neither of which recorded data can reproduce. `in_place` lists violations that the samples do not
-    contain and that abort requests replace. `played` of `rows` samples were requested. `same_wording` is False for a
-    file with other message texts, and `same_intervals` for one with another evaluation of uncertainties; neither is
-    then compared. `returned` is the result of the plan, or None if the plan did not end by itself.
+    contain; the replay makes abort requests in their place. `played` of `rows` samples were requested. `same_wording`
+    is False for a file with other message texts, and `same_intervals` for one with another evaluation of uncertainties;
+    neither is then compared. `returned` is the result of the plan, or None if the plan did not end by itself.
     """
 
     status: str
@@ -190,7 +190,7 @@ def replay(
 
 
 def _early_end(record: DataFile, over: str | None) -> str | None:
-    """Text that states where and why the recording ends before its plan; None if the plan ended."""
+    """Text that states where and why the recording ends before the end of its plan; None if the plan ended."""
     if record.status == UNFINISHED:
         return f"{over or 'it ends'}: the program that wrote it was killed, or is still writing"
     if over is None or record.status not in ("failed", "halted", "interrupted"):
