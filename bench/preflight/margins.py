@@ -136,7 +136,7 @@ class Margin:
 
     @property
     def likely(self) -> float | None:
-        """Margin that 95 % of the specimens reach or exceed, given the uncertainty; None if the demand is not predicted."""
+        """Margin that 95 % of the specimens reach or exceed, given the uncertainty; None if it is not predicted."""
         return None if self.demand.likely is None else 1.0 - self.demand.likely / self.bound.limit
 
     @property

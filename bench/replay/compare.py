@@ -189,7 +189,7 @@ class _DriveComparison:
             said = f"{said}; later recorded samples are not the response to the replayed drive"
             found.differences.append(Difference(said, DRIVE))
         elif self._exact < self.played:
-            said = f"drive samples that differ, by at most {self._largest:.2g} V: {self.played - self._exact}"
+            said = f"drive samples that differ: {self.played - self._exact}, by at most {self._largest:.2g} V"
             found.differences.append(Difference(said, DRIVE, rounding=True))
 
 
