@@ -125,7 +125,7 @@ class SpecimenMounted(Event):
     specimen: Specimen
     work: OperatorTask = column("", "action of the operator")
     amount: float | None = column(
-        "of the action", "amount involved in the action; absent if there is none", default=None
+        "of the action", "amount of the action, in SI units; absent if it has none", default=None
     )
     beta: float | None = column(
         "1", "stiffness ratio of the mounted spring; absent for the bare frame", default=None, init=False

@@ -31,7 +31,7 @@ class Estimate(Event):
 
     omega: float = column("rad/s", "circular frequency of the base motion")
     beta: float | None = column("1", "stiffness ratio of the coupling spring; absent for the bare frame")
-    cycles: int = column("1", "number of cycles of the estimate")
+    cycles: int = column("1", "number of cycles in the estimate")
     drift_peak: float = column("m", "peak drift")
     alpha_2: float = column("1", "running gain of the peak drift, coupled over bare")
     uncertainty: float = column("1", "expanded uncertainty of alpha_2 (k = 2)")

@@ -228,7 +228,8 @@ class DataFileWriter:
         wait_until_free(self._file_sync.touch)
         self._file.close()
         if whole := len(self._parts.rows["fits"]):
-            # the data are complete without the views; if another program holds the file now, a recovery adds them later
+            # the data are complete without the views; if another program has locked the file, a recovery adds them
+            # later
             with suppress(OSError, RuntimeError), hdf5.open_to_extend(self._path) as file:
                 add_fit_views(hdf5.group(file, "entry"), whole)
         self._file_sync.sync()

@@ -75,7 +75,7 @@ class Campaign:
     def specimen(self) -> Specimen:
         """The specimen of the predictions. Raises InvalidInput if the file has none or an invalid one."""
         if "specimen" not in self.record.metadata:
-            raise InvalidInput("record", str(self.path), "it has no specimen, so a prediction is impossible")
+            raise InvalidInput("record", str(self.path), "the file has no specimen, so a prediction is impossible")
         return validated(Specimen, self._json("specimen"), lambda where: f"{self.path.name}: specimen.{dotted(where)}")
 
     @cached_property
@@ -107,5 +107,7 @@ class Campaign:
         try:
             found = json.loads(self.record.metadata.get(name, "{}"))
         except json.JSONDecodeError as error:
-            raise InvalidInput("record", str(self.path), f"its entry {name!r} is not valid JSON: {error}") from None
+            raise InvalidInput(
+                "record", str(self.path), f"the entry {name!r} of the file is not valid JSON: {error}"
+            ) from None
         return cast(dict[str, Any], found) if isinstance(found, dict) else {}

@@ -10,7 +10,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Column:
-    """A table column: title, unit ("" for text and pure numbers), and whether it contains words."""
+    """A table column: title, unit ("" for text and pure numbers), and whether its cells are words, which are
+    left-aligned.
+    """
 
     title: str
     unit: str = ""

@@ -58,7 +58,7 @@ def map_section(specimen: Specimen, amplitude_factor: float, measured: Sequence[
 
 def _axis(low: float, high: float, step: float, places: Sequence[float], margin: float) -> tuple[float, ...]:
     """Equally spaced values over the range `low` to `high`, extended to include the measured `places` with a `margin`.
-    The spacing exceeds `step` if the values would be too many.
+    The spacing exceeds `step` if there would otherwise be too many values.
     """
     least = min([low, *(place - margin for place in places if place < low)])
     most = max([high, *(place + margin for place in places if place > high)])

@@ -51,7 +51,7 @@ class Loop:
         self._runaway: Violation | None = None
 
     def begin(self, reason: str) -> None:
-        """Arm the rig with zeros queued."""
+        """Arm the rig with samples of 0 V queued."""
         self._over = self._runaway = None
         self.check_requests()
         self.output.arm(reason)
@@ -156,7 +156,7 @@ class AtRest:
         self._loop.output.machine.go(State.RUNNING, "storeys at rest, signals tared")
 
     def acquire(self, step: AcquireAtRest) -> RestSamples:
-        """Acquire samples. A violation ends the acquisition but not the plan, because the table is not driven."""
+        """Acquire samples. An exceeded limit ends the acquisition but not the plan, because the table is not driven."""
         output = self._loop.output
         self._loop.begin("acquisition with the output at zero")
         counts: list[Counts] = []
@@ -210,7 +210,7 @@ class SineDrive:
         self._cycles = None
 
     def sweep(self, step: Sweep) -> Outcome:
-        """Drive the segments of the sweep, starting at the present amplitude and frequency."""
+        """Drive the segments of the sweep, starting at the current amplitude and frequency."""
         output = self._loop.output
         output.source.require_silence("segments")
         oscillator = output.source.oscillator

@@ -1,4 +1,4 @@
-"""Output of a bench: arming, block-by-block exchange, ramp-down and cut."""
+"""Output of a bench: arming, block-by-block exchange, ramp to zero, and cutting the enable line."""
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -77,7 +77,7 @@ class DriveSource:
         """Check a prepared drive.
 
         Raises InvalidInput unless it is one-dimensional, finite, zero at both ends and within the drive range, and the
-        present drive is zero.
+        current drive is zero.
         """
         if volts.ndim != 1 or volts.size == 0:
             raise InvalidInput("shape of a prepared drive", volts.shape, "it must be a non-empty one-dimensional array")
@@ -118,7 +118,7 @@ class Alignments:
         self._run: int | None = None
 
     def begin(self, run: int) -> None:
-        """Reset for a new run of the rig."""
+        """Note the number of the run that begins."""
         self._run = run
 
     def publish_values(self, run: int) -> None:
@@ -190,7 +190,7 @@ class Output:
         return self.read + self._rig.lead
 
     def arm(self, reason: str) -> None:
-        """Arm the rig with zeros queued."""
+        """Arm the rig with samples of 0 V queued."""
         self.source.reset()
         self.read = 0
         self._run += 1
@@ -200,7 +200,7 @@ class Output:
         self._alignments.begin(self._run)
 
     def exchange(self) -> Exchange:
-        """Drive and read one block; an open safety input halts the bench."""
+        """Send and read one block; an open safety input halts the bench."""
         try:
             exchange = self._guard.exchange(self.source.next(self.block))
         except RigError as error:

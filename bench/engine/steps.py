@@ -21,8 +21,8 @@ from sim.specimen import Specimen
 class OperatorAction:
     """Action, described by `request`, that the operator carries out on the bench at rest. Returns `Done`.
 
-    `specimen` is the specimen on the table afterwards. `amount` is the amount involved in the task, see
-    `drivers.rig.OperatorTask`; by default the nominal stiffness [N/m] of the specimen's spring, if it has one.
+    `specimen` is the specimen on the table afterwards. The meaning of `amount` depends on the task, see
+    `drivers.rig.OperatorTask`; the default is the nominal stiffness [N/m] of the specimen's spring, if it has one.
     """
 
     work: OperatorTask

@@ -24,7 +24,8 @@ PREFIXED = {"m": ((1e-3, "µm", 1e6), (1.0, "mm", 1e3)), "rad": ((1.0, "mrad", 1
 """For each unit: upper limits of the values, with the prefixed unit and the factor that apply below each."""
 
 APART = 8.0
-"""Largest ratio of a panel's span to the span of any column in the panel."""
+"""Maximum ratio of a panel's range of values to that of any of its columns; otherwise the columns are drawn separately.
+"""
 
 UNCERTAINTY, COVERAGE = "_uncertainty", 2.0
 """Suffix of the columns that are drawn as error bars of other columns, and the coverage factor of the bars."""

@@ -252,7 +252,7 @@ def _add_legend(figure: "Figure", unstable: bool, boundary: bool, measured: Sequ
 def least_over_omega(omegas: Floats, gain: Floats) -> Floats:
     """Frequency [rad/s], shape (n,), of the least `gain`, shape (n, m), within the range of `omegas`, shape (m,).
 
-    Fits a parabola to three points of log(gain); NaN where the least value lies on the edge or its neighbours
+    Fits a parabola to three points of log(gain); NaN where the least value is at the edge or its neighbours
     are absent.
     """
     least = np.full(len(gain), np.nan)

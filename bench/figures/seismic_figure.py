@@ -39,7 +39,7 @@ DASHES = ("-", "--", "-.", ":")
 BAND_SHADE = 0.15
 
 LETTERS = 100
-"""Length of a legend line [characters]; the sample of the curve takes eight."""
+"""Length of a legend line [characters]; the drawn sample of the curve counts as eight."""
 
 PANELS, PANELS_WIDTH, PANEL_HEIGHT = 3, 9.5, 2.5
 """Panels per row; width of the figure and height of a row [inch]."""

@@ -101,7 +101,7 @@ class Guard:
         return self.ramping and self._gain(0) == 0.0 and not self._waiting.any() and self._zeros > self._owed
 
     def arm(self) -> None:
-        """Arm the rig with zeros queued. Raises RigError while a safety input is open."""
+        """Arm the rig with samples of 0 V queued. Raises SafetyInputOpen, a RigError, while a safety input is open."""
         if opened := self._opened():
             closing = "close every safety input, then start again"
             raise SafetyInputOpen(f"arming is refused: {', '.join(opened)} open; {closing}", opened)
@@ -201,7 +201,8 @@ class Guard:
     def tare(self, values: NDArray[np.float64], *, drift: bool = True) -> None:
         """Take the mean of values at rest, shape (n, n_channels), as the zero of every signal.
 
-        From then on the drift is checked, unless it has no zero or `drift` is False because a laser is aimed elsewhere.
+        From then on the drift is checked, unless its zero is unknown or `drift` is False because a laser is aimed
+        elsewhere.
         """
         if self._signals is not None:
             self._signals.tare(values)
@@ -270,7 +271,7 @@ class Guard:
         return volts
 
     def _slewed(self, volts: NDArray[np.float64]) -> NDArray[np.float64]:
-        """`volts` with limited slew: the slew of a command may equal the limit, and the ramp adds to it."""
+        """`volts` with limited slew: the ramp adds to the slew of the commands, which may already equal the limit."""
         if np.abs(np.diff(volts, prepend=self._sent)).max() <= self._slew:
             return volts
         slowed, last = np.empty_like(volts), self._sent

@@ -11,7 +11,7 @@ from pydantic import model_validator
 from sim.errors import InvalidInput
 from sim.parameters import Parameters, quantity
 
-_SHARE = "share of the limit from which the operator is warned"
+_SHARE = "fraction of the limit at which the operator is warned"
 _PERSISTENCE = "time for which the limit must be exceeded before it trips"
 
 

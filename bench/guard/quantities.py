@@ -114,7 +114,7 @@ class WatchedQuantities:
         return found
 
     def skip(self, values: Array, bounds: dict[str, float]) -> None:
-        """Skip a block that has no missing samples; `bounds` are its bounds."""
+        """Skip a block without missing samples; `bounds` are those that the method `bounds` returned for this block."""
         self._tail = self._long[-self._span :]
         if "current" in bounds:
             self._skipped.append(values)

@@ -84,14 +84,14 @@ class SensorWatch:
         ]
 
     def _keep(self, drive: NDArray[np.float64]) -> None:
-        """Keep the drive blocks that contain the last `needed` samples."""
+        """Keep the drive blocks that contain the last `_needed` samples."""
         self._drives.append(drive)
         self._driven_samples += drive.size
         while self._driven_samples - self._drives[0].size >= self._needed:
             self._driven_samples -= self._drives.popleft().size
 
     def _driven(self) -> bool:
-        """Whether the drive changed by more than `_DRIVEN` in both halves of the last `needed` samples.
+        """Whether the drive changed by more than `_DRIVEN` in both halves of the last `_needed` samples.
 
         Near its peaks, a slow drive hardly changes within a single block.
         """

@@ -136,7 +136,7 @@ def discard(folder: Path) -> None:
 
 def _locked(folder: Path) -> ProcessLock:
     if folder.exists() and not (folder / OWN).exists() and any(folder.iterdir()):
-        raise InvalidInput("folder", str(folder), "it does not contain an unfinished map; rename or remove it")
+        raise InvalidInput("folder", str(folder), "the folder does not contain an unfinished map; rename or remove it")
     folder.mkdir(exist_ok=True)
     (folder / OWN).touch()
     try:

@@ -250,7 +250,9 @@ def _ridge(omegas: Floats, gains: Mapping[float, Floats]) -> Statement:
     ridge = {beta: float(omegas[np.nanargmax(gains[beta])]) for beta in RIDGE}
     holds = bool((np.diff(list(ridge.values())) > 0.0).all())
     values = {f"ridge at {beta:g}": place for beta, place in ridge.items()}
-    check = Check("the frequency of the largest α₂ grows with β", _listed(ridge, "{:.2f}") + " rad/s", holds, values)
+    check = Check(
+        "the frequency of the largest α₂ increases with β", _listed(ridge, "{:.2f}") + " rad/s", holds, values
+    )
     return Statement(7, "Ridge of the gain map", [check])
 
 

@@ -174,8 +174,8 @@ TOLERANCE = 1e-7
 
 @dataclass(frozen=True)
 class Travel:
-    """Largest magnitudes of the displacement at each laser and of the drift [m]. `toppled` is the time [s] at which the
-    block toppled; None if it did not topple, or if toppling was not evaluated.
+    """Largest magnitudes of the displacement measured by each laser and of the drift [m]. `toppled` is the time [s] at
+    which the block toppled; None if it did not topple, or if toppling was not evaluated.
     """
 
     storey_1: float
@@ -205,8 +205,8 @@ def stage_travels(
     """Travels of each specimen under its programme, which starts from rest; evaluated from `begin` [s] until the end of
     the programme or the fall of the block.
 
-    The programmes differ only in their amplitudes. `reference` is the mounting of the lasers. From `catch_angle` [rad]
-    on, the block counts as fallen.
+    The programmes differ only in their amplitudes. `reference` states whether the lasers are mounted on the ground or
+    the table. From `catch_angle` [rad] on, the block counts as fallen.
     """
     highest = max(max(sweep.omega) for sweep in programs[0].sweeps)
     times = np.arange(begin, programs[0].duration, tau / highest / PER_CYCLE)

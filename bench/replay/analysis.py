@@ -112,7 +112,9 @@ def write_analysis(original: Path, record: DataFile, analysis: Analysis, out: Pa
                 "--out", str(path), "the file exists and is never overwritten: give another name"
             ) from None
         except OSError as error:
-            raise InvalidInput("--out", str(path), f"the file cannot be created ({reason(error)})") from error
+            raise InvalidInput(
+                "--out", str(path), f"the file cannot be created ({reason(error)}): choose another folder"
+            ) from error
         try:
             with unfinished(path):
                 try:

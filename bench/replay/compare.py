@@ -111,8 +111,8 @@ class Comparison:
                 continue
             common = max(len(stored), len(rows))
             if broken_off is not None and path in (TwinEstimate.table, SensorsAligned.table):
-                # a killed program may lose its last samples but not the twin's estimates from them, and it has not
-                # published the end of its run
+                # a killed program may lose its last samples but not the live model's estimates from them, and it has
+                # not published the end of its run
                 common = min(len(stored), len(rows))
             elif broken_off is not None and path in self._entries:
                 common = entries[self._entries[path]]

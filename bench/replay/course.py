@@ -70,8 +70,8 @@ class RecordedCourse:
         entries = self._entries()
         members = record.columns_of(TwinEstimate).get("members", ())
         self.twin_in_time = len({*members}) <= 1 and not any(each.columns.get("realtime") for each in entries)
-        """Whether the live twin kept up with the samples. If it did not, the estimates of the replay differ, because a
-        replay waits for its twin.
+        """Whether the live model kept up with the samples. If it did not, the estimates of the replay differ, because a
+        replay waits for its live model.
         """
         self.in_place: tuple[str, ...] = ()
         self.journal = self._without_timing(entries)

@@ -41,7 +41,7 @@ class PacedClock:
         return self._now
 
     def wait_until(self, instant: float) -> None:
-        """Wait until bench time `instant` is due, and set the clock to it."""
+        """Wait until bench time `instant` [s] is due, and set the clock to this time."""
         ahead = instant - self._now
         if ahead <= 0.0:
             return
