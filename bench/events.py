@@ -35,7 +35,7 @@ class State(StrEnum):
 
 @dataclass(frozen=True)
 class Event:
-    """Event at `time` [s], counted by the bench's clock from the start of the session.
+    """Event at `time` [s] on the bench's clock, counted from the start of the session.
 
     If `time` is NaN, the stream sets it to the time of publication.
     """

@@ -146,7 +146,7 @@ class Rows:
 
 
 class PackedRows(Rows):
-    """Rows of packed numbers, appended as arrays."""
+    """Table whose fields are all packed; rows are buffered as arrays."""
 
     def __init__(self, parent: hdf5.Group, name: str, fields: Sequence[Field], packer: Packer | None = None) -> None:
         super().__init__(parent, name, fields, packer)

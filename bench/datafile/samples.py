@@ -39,7 +39,7 @@ def create_plot(entry: hdf5.Group, channels: Sequence[Channel], chunk: int) -> h
         TIME,
         "<f8",
         unit="s",
-        description="bench time of each row, for plots; the blocks contain the exact positions of the rows",
+        description="bench time of each row, for plots; the table of blocks contains the exact sample indices",
         chunk=chunk,
         compress=True,
     )
@@ -91,8 +91,8 @@ CHUNK_TIME = 0.5
 """Duration of a chunk of samples [s]; in a real-time run, the longest time for which samples are buffered."""
 
 VIRTUAL_CHUNK_TIME = 2.0
-"""Duration of a chunk of samples in virtual time [s], which runs a hundred times faster: compressing larger chunks
-takes half the time.
+"""Duration of a chunk of samples in virtual time [s], which is about a hundred times faster than real time: compressing
+larger chunks takes half the time.
 """
 
 

@@ -26,7 +26,7 @@ class Ending:
 
     @classmethod
     def failed(cls, error: RockbenchError) -> "Ending":
-        """Ending caused by an error."""
+        """Ending with status "failed", caused by an error."""
         return cls("failed", str(error), error.cause)
 
     def then(self, later: "Ending | None") -> "Ending":

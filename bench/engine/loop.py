@@ -46,7 +46,7 @@ class Loop:
         self.output = output
         self._guard, self._stream, self._requests = guard, stream, requests
         self.fall: FallWatch | None = None
-        """Detector of a fall of the mounted block; None if no specimen is mounted."""
+        """Detector of the fall of the mounted block; None if no specimen is mounted."""
         self._over: Violation | None = None
         self._runaway: Violation | None = None
 

@@ -35,8 +35,8 @@ class OperatorAction:
 class Arm:
     """Arm the rig with the output at zero, wait until the storeys are still, and tare every signal.
 
-    The storeys are still when neither u1 nor the drift scatters by more than `still` [m] over `rest` seconds. After
-    `patience` seconds the signals are tared regardless, with a warning.
+    The storeys are still when the standard deviations of u1 and the drift over `rest` seconds are at most `still` [m].
+    After `patience` seconds the signals are tared regardless, with a warning.
     """
 
     rest: float
