@@ -193,7 +193,7 @@ class Warned(Event):
 
 @event(table="exceeded_limits", notice="LIMIT", grave=True)
 class LimitExceeded(Event):
-    """The guard ended the run: `quantity` reached `value` beyond `limit`, both in `unit`."""
+    """A limit of the guard was exceeded: `quantity` reached `value`, which is beyond `limit`; both are in `unit`."""
 
     quantity: str = column("", "limited quantity")
     value: float = column("of the row", "value of the quantity")

@@ -17,7 +17,7 @@ THREADS = 2
 
 
 class Packer:
-    """Appends to compressed datasets; the compression runs in threads that start on demand."""
+    """Appends to compressed datasets; several chunks are compressed in parallel threads, which start on demand."""
 
     def __init__(self) -> None:
         self._pool = ThreadPoolExecutor(THREADS, "record packer")

@@ -100,7 +100,7 @@ class SampleReader:
 
     @property
     def rows(self) -> int:
-        """Number of samples of every channel and the drive."""
+        """Number of complete samples, the same for every channel and the drive."""
         stored = [self._counts(channel.name) for channel in self.channels]
         stored.append(hdf5.dataset(self._instrument, "drive/voltage"))
         return min(self._complete("samples"), *(data.shape[0] for data in stored))

@@ -198,7 +198,7 @@ class DataFileWriter:
         self._journal.add(event.time, kind, text, more)
 
     def commit(self, *, partial: bool) -> None:
-        """Write pending rows to the disk, visible to readers; incomplete chunks of samples only if `partial`."""
+        """Write pending rows to the disk, visible to readers; incomplete compressed chunks only if `partial`."""
         samples, tables = self._parts.samples, self._parts.rows
         self._file_sync.check()
         wait_until_free(self._file_sync.touch)

@@ -79,7 +79,7 @@ _Made = tuple[str, Cause]
 
 
 class Requests:
-    """Requests to end a run, from any thread or signal handler: stop, abort and halt, in ascending strength.
+    """Requests to end a run, from any thread or signal handler: stop, abort and halt, in order of severity.
 
     A request is never withdrawn. Plain flags are used because they need no lock, which could deadlock in a signal
     handler.
@@ -94,8 +94,8 @@ class Requests:
         """Whether an operating-system signal caused the request: the session then exits as soon as the rig is at rest.
         """
         self.breaking: Callable[[], BaseException] | None = None
-        """Constructor of the exception that a signal handler raises in the main thread after its request; None while
-        the loop polls for requests.
+        """Constructor of the exception that a signal handler raises in the main thread after making its request; None
+        while the loop polls for requests.
         """
         self.rig_closed = False
         """Whether no rig is open, so that the process may exit at once."""

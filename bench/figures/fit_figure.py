@@ -89,7 +89,7 @@ def _ends(values: NDArray[np.float64]) -> tuple[float, float]:
 
 
 def _scaled(fit: FitFinished, names: list[str]) -> tuple[str, float]:
-    """Prefixed unit and factor of the drawn values."""
+    """Unit with prefix, and the factor that converts values to it for drawing."""
     unit = fit.columns[names[0]].unit
     size = max(abs(end) for name in names for end in _ends(fit.columns[name].values))
     return next(((there, factor) for below, there, factor in PREFIXED.get(unit, ()) if size < below), (unit, 1.0))

@@ -44,8 +44,7 @@ LEGEND = (
 
 HEADROOM = 1.35
 FLOOR, CEILING = 0.01, 20.0
-"""Limits beyond which predicted gains do not extend the axis: no bench can distinguish such gains from 0 or from a
-resonance.
+"""Limits beyond which predicted gains do not extend the axis, because no bench can measure such small or large gains.
 """
 
 Prediction = Mapping[str, NDArray[Any]]

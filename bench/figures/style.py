@@ -21,7 +21,8 @@ if TYPE_CHECKING:
 
 DPI = 200
 
-# Okabe and Ito (2008): distinguishable with colour blindness; markers and dashes distinguish them in greyscale print
+# Okabe and Ito (2008): colours that colour-blind readers can distinguish; markers and dashes distinguish them in
+# greyscale print
 BLACK, BLUE, VERMILLION, GREEN, PURPLE, GREY = "#000000", "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#666666"
 ORANGE, SKY, PALE = "#E69F00", "#56B4E9", "#DDDDDD"
 

@@ -54,7 +54,7 @@ class LongTerm:
     falls: float = nan
 
     def gain(self, of: Callable[[NDArray[np.float64]], np.float64]) -> float:
-        """Value of the function `of`, such as a mean, for the gains; NaN if the block falls."""
+        """Result of the function `of`, such as `np.mean`, for the gains; NaN if the block falls."""
         return float(of(self.gains)) if self.gains.size else nan
 
 

@@ -136,7 +136,7 @@ def _curve(
 
 
 DIGITS = 9
-"""Significant digits of peaks and gains: the relative error of a step is 1e-10, which impacts amplify."""
+"""Significant digits of peaks and gains: impacts amplify the relative error of an integration step, 1e-10."""
 
 Columns = Mapping[str, tuple[type, str, str]]
 

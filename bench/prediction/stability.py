@@ -25,7 +25,7 @@ BOUNDARY = 1e-4
 UNKNOWN = complex(nan, nan)
 
 REAL = 0.02
-"""Largest distance of a multiplier's argument from 0 or pi [rad] at which it counts as real."""
+"""Maximum distance of a multiplier's argument from 0 or pi [rad] at which the multiplier counts as real."""
 
 
 def multipliers_table(

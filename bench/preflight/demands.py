@@ -62,7 +62,7 @@ class SimulatedTable:
 
 @dataclass(frozen=True)
 class IdentifiedTable:
-    """Response of an identified table; includes the specimen and friction at the time of identification."""
+    """Response of an identified table, with the effects of the specimen and friction at the time of identification."""
 
     model: TableModel
 

@@ -19,7 +19,7 @@ from drivers.rig import Channel, Counts
 from sim.errors import InvalidInput
 
 _AHEAD = 10.0
-"""Duration read in one access [s]: reading thousands of samples takes no longer than reading one."""
+"""Duration of the samples read in one access [s]: reading thousands of samples takes no longer than reading one."""
 
 
 @dataclass(frozen=True)

@@ -21,12 +21,12 @@ from sim import waiting
 from sim.parameters import Parameters
 
 LONGEST_WAIT = 1.0
-"""Longest pause in a replay in real time [s]; longer ones, for operator actions, are shortened to it."""
+"""Maximum pause in a replay in real time [s]; longer pauses, as for operator actions, are shortened to it."""
 
 
 class PacedClock:
     """Clock that shows the recorded time and runs at `speed` times real time. No block is late, however slow the
-    computer.
+    computer is.
 
     With a real-time clock, blocks that were recorded in time could be late for the guard.
     """
