@@ -35,13 +35,13 @@ class State(StrEnum):
 
 @dataclass(frozen=True)
 class Event:
-    """Event at `time` [s], counted by the bench's clock from the start of the session.
+    """Event at `time` [s] on the bench's clock, counted from the start of the session.
 
     If `time` is NaN, the stream sets it to the time of publication.
     """
 
     table: ClassVar[str] = ""
-    """Path of its columns in the data file, below /entry; empty for an event that is stored only in the journal."""
+    """Path of the table of its columns in the data file, below /entry; empty for an event without such a table."""
     journalled: ClassVar[bool] = True
     """Whether the event is written to the journal; frequent events are not."""
     notice: ClassVar[str] = ""
@@ -53,7 +53,7 @@ class Event:
 
     @property
     def line(self) -> str:
-        """Line for the journal."""
+        """Text of the event in the journal."""
         names = (each.name for each in fields(self) if each.name != "time")
         return ", ".join(f"{name} = {getattr(self, name)}" for name in names)
 
@@ -125,7 +125,7 @@ class SpecimenMounted(Event):
     specimen: Specimen
     work: OperatorTask = column("", "action of the operator")
     amount: float | None = column(
-        "of the action", "amount involved in the action; absent if there is none", default=None
+        "of the action", "amount of the action, in SI units; absent if it has none", default=None
     )
     beta: float | None = column(
         "1", "stiffness ratio of the mounted spring; absent for the bare frame", default=None, init=False
@@ -165,7 +165,7 @@ class StepStarted(Event):
 
 @event(journalled=False)
 class Progress(Event):
-    """Completed fraction of the campaign (0 to 1), present step, and estimated remaining bench time [s]."""
+    """Completed fraction of the campaign (0 to 1), current step, and estimated remaining bench time [s]."""
 
     fraction: float
     remaining: float
@@ -193,7 +193,7 @@ class Warned(Event):
 
 @event(table="exceeded_limits", notice="LIMIT", grave=True)
 class LimitExceeded(Event):
-    """The guard ended the run: `quantity` reached `value` beyond `limit`, both in `unit`."""
+    """A limit of the guard was exceeded: `quantity` reached `value`, which is beyond `limit`; both are in `unit`."""
 
     quantity: str = column("", "limited quantity")
     value: float = column("of the row", "value of the quantity")

@@ -11,7 +11,7 @@ _FORMULA = ("=", "+", "-", "@", "\t", "\r")
 
 
 def shown(text: str) -> str:
-    """The text for a terminal, in which escapes replace control characters, since these could move the cursor or run a
+    """The text for a terminal, with control characters replaced by escapes, since they could move the cursor or run a
     command.
     """
     return _CONTROL.sub(lambda found: f"\\x{ord(found[0]):02x}", text)

@@ -16,7 +16,7 @@ class LiveValue(Event):
     """Running value of a quantity that a protocol measures, with its `label`; NaN while unknown."""
 
     label: str = column("", "description of the quantity")
-    value: float = column("of the row", "present value, in the unit of the row")
+    value: float = column("of the row", "current value, in the unit of the row")
     unit: str = column("", 'SI unit of the row; "1" for a pure number', default="1")
     uncertainty: float = column("of the row", "expanded uncertainty of the value (k = 2); NaN if unknown", default=nan)
     predicted: float = column("of the row", "predicted value; NaN if there is none", default=nan)
@@ -26,12 +26,12 @@ class LiveValue(Event):
 class Estimate(Event):
     """Running gain coefficient of the point under test; NaN while unknown.
 
-    `predicted` is the prediction for the branch of steady motion at which the start of the test aims.
+    `predicted` is the prediction for the branch of steady motion that the start of the test is intended to reach.
     """
 
     omega: float = column("rad/s", "circular frequency of the base motion")
     beta: float | None = column("1", "stiffness ratio of the coupling spring; absent for the bare frame")
-    cycles: int = column("1", "number of cycles of the estimate")
+    cycles: int = column("1", "number of cycles in the estimate")
     drift_peak: float = column("m", "peak drift")
     alpha_2: float = column("1", "running gain of the peak drift, coupled over bare")
     uncertainty: float = column("1", "expanded uncertainty of alpha_2 (k = 2)")

@@ -24,17 +24,17 @@ Array = NDArray[np.float64]
 E = TypeVar("E", bound=Event)
 
 FITS, KEPT = 60, 2000
-"""Largest number of stored events of a type with arrays, such as fits with recordings, and of stored events of each
-other type. All points are stored.
+"""Maximum number of stored events of a type with arrays, such as fits with recordings, and of any other type. All
+points are stored.
 """
 MOST = 6
-"""Largest number of curves that a panel shows of one fit."""
+"""Maximum number of curves of one fit in a panel."""
 DERIVED = ("residual", "uncertainty")
 """Suffixes of the names of series of a fit that are not drawn."""
 FITTED = "fitted"
 """Suffix of the names of series of a fit that are computed by its model."""
 _ELSEWHERE = (Progress, StateChanged, StepStarted, Warned, Estimate, RunningGain, TwinEstimate)
-"""Frequent events that other parts of the window show."""
+"""Events that other parts of the window show."""
 
 Style: TypeAlias = Literal["line", "points", "predicted", "reference"]
 
@@ -63,7 +63,7 @@ class Panel:
 
     The methods that add curves omit a curve without a finite point; arrays of different shapes raise ValueError.
 
-    awaits : sentence shown until there is a result, which announces it.
+    awaits : sentence that announces the result, shown until there is one.
     logarithmic : the axes that have a logarithmic scale.
     equal : whether both axes have the same scale, as for a complex plane.
     """
@@ -98,7 +98,9 @@ class Panel:
         return self._add("", x, y, "reference")
 
     def fit(self, fit: FitFinished) -> "Panel":
-        """Add the series of a fit that have the unit of `y`, up to `MOST`, over its first series; returns the panel."""
+        """Add the series of a fit that have the unit of `y`, at most `MOST`, against its first series; returns the
+        panel.
+        """
         (_, along), *others = fit.columns.items()
         chosen = [
             (name, series.values)
@@ -124,7 +126,7 @@ class Panel:
 
 @dataclass(frozen=True)
 class GainCurve:
-    """Measured gains alpha_2 and their predicted lines, over the frequency or, for records, the stiffness ratio."""
+    """Measured gains alpha_2 and their predicted lines against frequency or, for records, against stiffness ratio."""
 
 
 Verdict: TypeAlias = Literal["passed", "failed", "pending", "other"]
@@ -206,7 +208,9 @@ Live: TypeAlias = Callable[[LiveRun], LiveView]
 
 
 def standard_view(run: LiveRun) -> LiveView:
-    """View of a protocol that declares none: its gains, its last fit, the response of the table, or its live values."""
+    """View of a protocol that declares none: the first available of gains, last fit, response of the table, live
+    values.
+    """
     if "alpha_2" in run.point.model_fields or any("alpha_2" in type(point).model_fields for point in run.points):
         return (GainCurve(),)
     if run.fits:
@@ -228,7 +232,7 @@ def standard_view(run: LiveRun) -> LiveView:
 
 
 def response_panel(table: TableIdentified | None) -> Panel:
-    """Panel with the magnitude of the table's response over the frequency, empty while `table` is None."""
+    """Panel with the magnitude of the table's response against frequency, empty while `table` is None."""
     panel = Panel(
         "response of the table",
         ("frequency", "Hz"),

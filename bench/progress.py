@@ -10,7 +10,7 @@ class Progress(Protocol):
     """
 
     def __call__(self, phase: str, done: int = 0, total: int = 0, /) -> None:
-        """Report the present stage, `phase`, with `done` of its `total` parts complete if they can be counted."""
+        """Report the current `phase`, with `done` of its `total` parts complete; `total` is 0 if unknown."""
         ...
 
 

@@ -32,7 +32,7 @@ P = TypeVar("P", bound=Parameters)
 T = TypeVar("T")
 
 Sources: TypeAlias = Mapping[str, Mapping[str, "Column"]]
-"""Tables of a data file, by name."""
+"""Tables of a data file by name, each with its columns by name."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,8 +194,7 @@ class RunView:
     default the first field with an uncertainty. `labels` are the printed names of fields of a point, such as
     "restitution rₑₓₚ"; a field without a label is shown with the first words of its description. `matrix` has the axes
     of the rows and the columns in which the points are arranged, if the values on them are known before the run. `live`
-    returns the live view of the window, as a function of a `bench.live_view.LiveRun`; without it,
-    `bench.live_view.standard_view` does.
+    returns the live view of the window for a `bench.live_view.LiveRun`; the default is `bench.live_view.standard_view`.
     """
 
     headline: str = ""

@@ -1,4 +1,4 @@
-"""Version of the software that produced a result."""
+"""Versions of the software that produced a result."""
 
 import json
 import platform

@@ -1,5 +1,5 @@
-"""The recorder, a subscriber that writes a campaign to its file in a thread, so that a slow disk never delays the
-drive.
+"""The recorder, an event subscriber that writes a campaign to its data file in a thread of its own, so that a slow disk
+does not delay the drive.
 """
 
 import queue
@@ -27,20 +27,21 @@ from sim.errors import InvalidInput
 from sim.parameters import Parameters
 
 PERIOD = 0.5
-"""Longest time between two writes of pending data [s]; in real time, the duration of a chunk of samples."""
+"""Maximum time between two writes of pending data [s]; equal to the duration of a chunk of samples in real time."""
 
 PAUSE = 0.05
-"""Shortest time between two writes of events [s], so that many events are written at once on a slow disk."""
+"""Minimum time between two writes of events [s], so that a slow disk receives many events in one write."""
 
 COLLECT = 0.02
 """Time during which blocks are collected before they are taken from the queue [s]; other events are taken at once."""
 
 BATCH = 100
-"""Number of chunks written at once when samples arrive faster than real time."""
+"""Number of complete chunks of samples that are written together when samples arrive faster than real time; more queued
+items than this wake the thread.
+"""
 
 BACKLOG = 4096
-"""Largest number of events that may wait for the disk; in real time, those of several minutes. A longer backlog ends
-the run.
+"""Maximum number of events waiting for the disk; in real time, those of several minutes. A longer backlog ends the run.
 """
 
 PATIENCE = 60.0
@@ -76,7 +77,7 @@ class Recorder:
     `chunk_time` is the duration of a chunk of samples [s].
 
     `metadata` is stored as strings under /entry/metadata, `tables` (such as {"prediction": ...}) under /entry. `events`
-    are those of the protocol whose tables the file needs; any other of its events is stored only as a line of the
+    are the protocol's event types that have a table in the file; its other events are stored only as lines of the
     journal. Raises InvalidInput, without creating a file, if `path` exists or cannot be created, or if a name or table
     is invalid.
     """
@@ -127,14 +128,14 @@ class Recorder:
             self._enqueue(self._checked(event))
         elif isinstance(event, PointFinished) and not isinstance(event.point, self._point_type):
             raise DataFileError(
-                f"point of type {type(event.point).__name__} was not recorded: {self.path} is for"
+                f"point of type {type(event.point).__name__} was not recorded: {self.path} is for points of type"
                 f" {self._point_type.__name__}"
             )
         elif not isinstance(event, Progress):
             self._enqueue(event)
 
     def stores(self, event: type[Event]) -> bool:
-        """Whether the event is stored with its columns, if it has any, and not only as a line of the journal."""
+        """Whether events of this type are stored with their columns, if any, and not only as lines of the journal."""
         return self._writer.has_table(event)
 
     def sync(self) -> None:
@@ -148,8 +149,8 @@ class Recorder:
     def close(self, status: Status | str, summary: str = "") -> None:
         """Write pending data, status and end time, and close the file; closing again has no effect.
 
-        Raises InvalidInput for a status with which a campaign cannot end, DataFileError if the end could not be
-        written. An unresponsive disk does not block the end of the program.
+        Raises InvalidInput for a status that does not end a campaign, and DataFileError if the end could not be
+        written. An unresponsive disk does not prevent the program from ending.
         """
         ends = [str(end) for end in Status if end not in (Status.RUNNING, Status.INTERRUPTED)]
         if status not in ends:
@@ -158,7 +159,7 @@ class Recorder:
             return
         self._closed = True
         self._end = _End(Status(status), summary)
-        # wakes a waiting thread; a thread that is writing checks for the end itself
+        # wakes the thread if it is waiting; if it is writing, it checks for the end afterwards
         self._put(_Sync(threading.Event()), 0.0)
         if not waiting.join(self._thread, PATIENCE):
             self._stop_recording(f"has not responded for {PATIENCE:g} s")
@@ -170,7 +171,7 @@ class Recorder:
             self._raise_failure()
 
     def _put(self, item: _Block | Event | _Sync, patience: float) -> bool:
-        """Queue an item if space becomes free within `patience` seconds."""
+        """Queue an item, waiting up to `patience` seconds for space; False if the queue remained full."""
         queued = waiting.put(self._queue, item, patience)
         if not isinstance(item, _Block) or self._queue.qsize() > BATCH:
             self._wanted.set()
@@ -182,7 +183,9 @@ class Recorder:
         self._behind = self._behind or DataFileError(why)
 
     def _checked(self, event: Acquired) -> _Block:
-        """Transposed copies of the block's arrays: a driver may reuse its buffer."""
+        """Copy of the block, because a driver may reuse its buffer, with counts of shape (n_channels, n). Raises
+        DataFileError for arrays of other shapes.
+        """
         counts, n = event.block.counts, len(event.block)
         if counts.shape != (n, self._n_channels) or event.drive.shape != (n,):
             raise DataFileError(
@@ -211,10 +214,11 @@ class Recorder:
         self._attempt(partial(self._writer.finish, self._end.status, self._end.summary))
 
     def _next(self) -> _Block | Event | _Sync | None:
-        """The next item; None if there is none for a while.
+        """The next item of the queue; None if none arrives within `PERIOD`, or within `PAUSE` while events must be
+        written.
 
         Blocks are collected for a moment before they are taken, since waking this thread for each of them would delay
-        the loop, which may run a hundred times faster than real time.
+        the loop, which in virtual time can be a hundred times faster than real time.
         """
         with suppress(queue.Empty):
             return self._queue.get_nowait()
@@ -238,7 +242,7 @@ class Recorder:
             )
             failure.__cause__ = error
             self._failure = failure
-            # the operation that failed may fail again
+            # releasing the file may fail for the same reason
             with suppress(Exception):
                 self._writer.abandon()
 

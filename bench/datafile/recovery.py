@@ -1,7 +1,7 @@
-"""Recovery of a clean file from a file whose writer was killed, whose disk was full, that was truncated, or that has an
-old format.
+"""Recovery of a valid file from one that has an old format, was truncated, or whose writer was killed or ran out of
+disk space.
 
-The original is not changed. The copy has the intact data in the present layout, with checksums.
+The original is not changed. The copy contains the intact data in the current layout, with checksums.
 """
 
 from collections import defaultdict
@@ -36,11 +36,11 @@ Row = Mapping[str, Any]
 
 
 def add_lost_events(entry: hdf5.Group, lines: Sequence[Row]) -> tuple[int, int]:
-    """Append, to the tables of events and points, the rows that are found only in the journal. Returns the numbers of
-    added events and points.
+    """Append the rows that only the journal contains to the tables of events, of points and of single types of event.
+    Returns the numbers of added events and points.
 
     Points are checked separately, because a point can be missing although its event is present. Raises DataFileError,
-    without appending, for the journal of another file, which is recognised because its beginning differs.
+    without appending, if the journal is damaged or differs from the stored rows because it is that of another file.
     """
     points = [line["point"] for line in lines if "point" in line]
     events = _beyond(hdf5.group(entry, "events"), lines, ("time", "kind"))
@@ -61,8 +61,8 @@ def add_lost_events(entry: hdf5.Group, lines: Sequence[Row]) -> tuple[int, int]:
 def _beyond(
     table: hdf5.Group, rows: Sequence[Row], compared: Sequence[str] | None = None
 ) -> list[tuple[hdf5.Dataset, NDArray[Any]]]:
-    """Every dataset of a table, with the rows of the journal to add to it. Raises DataFileError unless the journal's
-    earlier rows equal those of the table.
+    """Each dataset of a table with the journal's values to append to it. Raises DataFileError unless the earlier rows
+    of the journal equal those of the table in the `compared` datasets (by default all).
     """
     new: list[tuple[hdf5.Dataset, NDArray[Any]]] = []
     for name in table:
@@ -71,13 +71,13 @@ def _beyond(
         try:
             values = np.array([field.encode(row.get(name)) for row in rows], dtype=field.dtype)
         except UNREADABLE as error:
-            raise DataFileError(f"the journal has no {name} for {table.name}: it is damaged") from error
+            raise DataFileError(f"the journal is damaged: it has no valid {name} for {table.name}") from error
         if compared is None or name in compared:
             early = values[: len(known)]
-            # JSON has no NaN or infinity: a number that is absent from the journal counts as equal
+            # JSON has no NaN or infinity: a number missing from the journal therefore counts as equal
             same = (early == known[: len(early)]) | ((early != early) if early.dtype.kind == "f" else False)
             if not np.all(same):
-                raise DataFileError(f"journal and file differ in {stored.name}: it is the journal of another file")
+                raise DataFileError(f"journal and file differ in {stored.name}: the journal is that of another file")
         new.append((stored, values[len(known) :]))
     return new
 
@@ -87,10 +87,11 @@ NOTE = "recovery"
 
 @dataclass(frozen=True)
 class Recovery:
-    """Result of a recovery: the new file, its rows of samples, and the numbers of events and points from the journal.
+    """Result of a recovery: the new file, its number of rows of samples, and the numbers of events and points added
+    from the journal.
 
-    `lost` holds, by part, the number of rows that were written to the original but are missing from the copy. `damage`
-    names objects that are missing, or that were copied although they do not match their checksum.
+    `lost` is the number of rows of each part of the file that were written to the original but are missing from the
+    copy. `damage` describes objects that are missing, or that were copied although they do not match their checksum.
     """
 
     target: Path
@@ -102,30 +103,31 @@ class Recovery:
 
     @property
     def unreadable(self) -> int:
-        """Lost samples per channel."""
+        """Number of lost samples per channel."""
         return self.lost.get("samples", 0)
 
     @property
     def loss(self) -> str:
-        """The losses as text; empty if there are none."""
+        """Description of the losses; empty if there are none."""
         return ", ".join(f"{count} rows of {part}" for part, count in self.lost.items())
 
 
 def write_ends(record: DataFile, path: Path, entry: hdf5.Group, lengths: Mapping[str, int], loss: str) -> None:
-    """Write the values that are set when a campaign ends: those of the original, or replacements with the reason.
+    """Write row counts, status, summary and end time: those of the original or, if it was not closed or lost data,
+    values that state the reason.
 
-    `lengths` are the numbers of rows of every part; `loss` describes the missing data.
+    `lengths` is the number of rows of each part; `loss` describes the missing data.
     """
     complete, status, summary, end_time = create_ends(entry, tuple(record.counted))
     complete[...] = [lengths.get(name, 0) for name in record.counted]
     was, why, end = (_text(record, name) for name in ("status", "summary", "end_time"))
     if was not in [each.value for each in Status] or was == Status.RUNNING:
-        # the time of the crashed writer's last known activity
+        # the last modification, as the end of the crashed writer's activity
         end = datetime.fromtimestamp(path.stat().st_mtime).astimezone().isoformat(timespec="milliseconds")
         was, why = Status.INTERRUPTED, "the recording ended without being closed; recovered from the data on the disk"
         why += f", without {loss}" if loss else ""
     elif loss:
-        why = f"part of the file was lost: {loss}; the campaign had ended as {was}" + (f": {why}" if why else "")
+        why = f"part of the file was lost: {loss}; the campaign ended with status {was}" + (f": {why}" if why else "")
         was = Status.INTERRUPTED
     for stored, text, width in zip(
         (status, summary, end_time), (was, why, end), (STATUS_WIDTH, SUMMARY_WIDTH, TIME_WIDTH), strict=True
@@ -134,7 +136,7 @@ def write_ends(record: DataFile, path: Path, entry: hdf5.Group, lengths: Mapping
 
 
 def write_note(record: DataFile, path: Path, entry: hdf5.Group, result: Recovery) -> None:
-    """Add one note: the lines of earlier recoveries, a line on this recovery, and a line for each damaged object."""
+    """Add a note: the lines of earlier recoveries, a line about this recovery, and a line for each damaged object."""
     recovered = (
         f"from {path.name} of format {record.format_version}: {result.rows} samples per channel kept,"
         f" {result.loss or 'no rows'} lost, {result.from_journal} events and {result.points_from_journal} points from"
@@ -160,7 +162,7 @@ _ROWS_TOGETHER = 2**18
 
 
 def recover(path: Path, target: Path, progress: Progress = silent) -> Recovery:
-    """Recover the contents of `path` to `target`.
+    """Recover the contents of `path` into the new file `target`.
 
     Raises InvalidInput if `target` exists or `path` is not a data file, and DataFileError if the file is too damaged.
     """
@@ -168,7 +170,9 @@ def recover(path: Path, target: Path, progress: Progress = silent) -> Recovery:
         temporary = target.with_name(f"{target.name}.part")
         for taken in (target, temporary):
             if taken.exists():
-                raise InvalidInput("recovered file", str(taken), "the file exists and is never overwritten")
+                raise InvalidInput(
+                    "recovered file", str(taken), "the file exists and is never overwritten; choose another name"
+                )
         try:
             with unfinished(temporary):
                 result = _rebuild(record, path, temporary, target, progress)
@@ -231,7 +235,7 @@ def _is_renewed(path: str) -> bool:
 
 
 def _counted(record: DataFile, judged: Integrity) -> Mapping[str, int]:
-    """Number of rows of every part written to the disk or, if that is unknown, the length of its longest dataset."""
+    """Number of complete rows of each part or, if the stored numbers are damaged, the length of its longest dataset."""
     if "/entry/complete" not in judged.failing:
         return record.counted
     lengths = dict.fromkeys(record.counted, 0)

@@ -17,7 +17,7 @@ THREADS = 2
 
 
 class Packer:
-    """Appends to compressed datasets; the compression runs in threads that start on demand."""
+    """Appends to compressed datasets; several chunks are compressed in parallel threads, which start on demand."""
 
     def __init__(self) -> None:
         self._pool = ThreadPoolExecutor(THREADS, "record packer")
@@ -46,12 +46,12 @@ class Packer:
 
 
 def pack(chunks: NDArray[Any]) -> list[bytes]:
-    """The bytes of `chunks`, shape (n, rows), after the filters `hdf5.FILTERS`: for each chunk the first bytes of all
-    values, then the second bytes, and so on, compressed.
+    """Apply the filters `hdf5.FILTERS` to `chunks` of shape (n, rows): for each chunk, the first bytes of all values,
+    then the second bytes, and so on, compressed.
 
-    Each result is padded with zeros, which decoders ignore after the end of the stream, to whole pages of the file or
-    to a half, a quarter ... of a page. HDF5 would otherwise keep a description of each unused remainder of a page in
-    memory until the file is closed: 260 bytes per chunk, 9 MB per hour.
+    Each result is padded with zeros, which decoders ignore after the end of the stream, to a whole number of pages of
+    the file or to a half, a quarter ... of a page. HDF5 would otherwise keep a description of each unused remainder of
+    a page in memory until the file is closed: 260 bytes per chunk, 9 MB per hour.
     """
     n, size = len(chunks), chunks.dtype.itemsize
     shuffled = np.ascontiguousarray(chunks).view(np.uint8).reshape(n, -1, size).transpose(0, 2, 1)
@@ -60,12 +60,14 @@ def pack(chunks: NDArray[Any]) -> list[bytes]:
 
 
 def _allocated(size: int) -> int:
-    """Smallest number of whole pages, or power of two below a page, that holds `size` bytes."""
+    """Smallest multiple of a page, or power of two up to a page, that holds `size` bytes [bytes]."""
     return -(-size // hdf5.PAGE) * hdf5.PAGE if size > hdf5.PAGE else 1 << (size - 1).bit_length()
 
 
 class Growing:
-    """Appends rows to a dataset and hashes them, so that they need not be read again at the end of a long run."""
+    """Appends rows to a dataset and updates its checksum, so that the rows need not be read again at the end of a long
+    run.
+    """
 
     def __init__(self, stored: hdf5.Dataset, packer: Packer | None = None) -> None:
         """`packer` compresses and writes complete chunks."""
@@ -89,15 +91,15 @@ class Growing:
             hdf5.append(self._stored, kept)
         else:
             self._packer.append(self._stored, kept)
-        # hashed through a view of bytes, because strings have no buffer
+        # hashed as bytes, because string arrays do not support the buffer protocol
         self._digest.update(kept.view(np.uint8).data)
 
 
 class Rows:
-    """A group with one dataset per field."""
+    """Table stored as a group with one dataset per field; `write` writes the buffered rows."""
 
     def __init__(self, parent: hdf5.Group, name: str, fields: Sequence[Field], packer: Packer | None = None) -> None:
-        """`packer` compresses the packed fields."""
+        """`packer` compresses the datasets of fields that are declared as packed."""
         group = hdf5.create_group(parent, name, "NXcollection")
         self._columns = [(field, Growing(field.create(group), packer if field.packed else None)) for field in fields]
         self._fields, self._texts = tuple(fields), tuple(field.kind is Kind.TEXT for field in fields)
@@ -122,7 +124,7 @@ class Rows:
         self._pending.append(
             tuple(
                 [
-                    # numbers are stored as they are
+                    # numbers need no encoding
                     value if type(value) in (float, int) and not text else field.encode(value)
                     for field, text, value in zip(self._fields, self._texts, values, strict=True)
                 ]
@@ -134,7 +136,7 @@ class Rows:
         self._pending += zip(*(column.tolist() for column in columns), strict=True)
 
     def write(self, *, partial: bool = True) -> None:  # noqa: ARG002 - uncompressed rows are appended in place
-        """Write the buffered rows to the file; an incomplete chunk of packed fields is written only if `partial`."""
+        """Write the buffered rows to the file; if all fields are packed, an incomplete chunk only if `partial`."""
         if not self._pending:
             return
         for (field, stored), values in zip(self._columns, zip(*self._pending, strict=True), strict=True):
@@ -144,7 +146,7 @@ class Rows:
 
 
 class PackedRows(Rows):
-    """Rows of packed numbers, appended as arrays."""
+    """Table whose fields are all packed; rows are buffered as arrays."""
 
     def __init__(self, parent: hdf5.Group, name: str, fields: Sequence[Field], packer: Packer | None = None) -> None:
         super().__init__(parent, name, fields, packer)
@@ -173,5 +175,5 @@ class PackedRows(Rows):
 
 
 def rows_of(parent: hdf5.Group, name: str, fields: Sequence[Field], packer: Packer | None = None) -> Rows:
-    """Create a table of these fields; `packer` compresses the packed ones."""
+    """Create a table of these fields; `packer` compresses the datasets of packed fields."""
     return (PackedRows if all(field.packed for field in fields) else Rows)(parent, name, fields, packer)

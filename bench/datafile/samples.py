@@ -20,8 +20,10 @@ PLOT, TIME = "data", "time"
 
 def create_plot(entry: hdf5.Group, channels: Sequence[Channel], chunk: int) -> hdf5.Dataset:
     """Create the plot of the first channel, and of all channels of the same kind, against time, with links to the other
-    channels; the time axis is filled later. The counts are not converted: by the NXdata standard, values are (counts +
-    `<name>_offset`) * `<name>_scaling_factor`.
+    channels. Returns its empty time axis, to which the writer appends.
+
+    The counts are not converted: by the NXdata standard, values are (counts + `<name>_offset`) *
+    `<name>_scaling_factor`.
     """
     data = hdf5.create_group(entry, PLOT, "NXdata")
     first, *others = channels
@@ -37,7 +39,7 @@ def create_plot(entry: hdf5.Group, channels: Sequence[Channel], chunk: int) -> h
         TIME,
         "<f8",
         unit="s",
-        description="bench time of each row, for plots; the blocks contain the exact positions of the rows",
+        description="bench time of each row, for plots; the table of blocks contains the exact sample indices",
         chunk=chunk,
         compress=True,
     )
@@ -64,8 +66,8 @@ def companions(name: str) -> tuple[str, str]:
 class Timeline:
     """Times that rise by one sample period within a run, and jump where samples are missing.
 
-    A run is placed in time by the instant at which its first block had been read; all its times include the delay of
-    that read.
+    The time at which the first block of a run was read determines the origin of the run, so that all its times include
+    the delay of that read.
     """
 
     def __init__(self, sample_rate: float) -> None:
@@ -89,8 +91,8 @@ CHUNK_TIME = 0.5
 """Duration of a chunk of samples [s]; in a real-time run, the longest time for which samples are buffered."""
 
 VIRTUAL_CHUNK_TIME = 2.0
-"""Duration of a chunk of samples in virtual time [s], which runs a hundred times faster: compressing larger chunks
-takes half the time.
+"""Duration of a chunk of samples in virtual time [s], which is about a hundred times faster than real time: compressing
+larger chunks takes half the time.
 """
 
 
@@ -159,7 +161,7 @@ def read_channels(instrument: hdf5.Group) -> tuple[Channel, ...]:
 
 
 def read_channel(instrument: hdf5.Group, name: str) -> Channel:
-    """The channel `name` as stored."""
+    """Reads the conversion and valid range of channel `name`. Raises DataFileError if they are damaged."""
     stored = hdf5.dataset(instrument, f"{name}/counts")
     with reading(f"the conversion of {stored.name}"):
         attrs = stored.attrs
@@ -203,8 +205,8 @@ def _create_channel(instrument: hdf5.Group, channel: Channel, chunk: int) -> hdf
 
 def create_drive(instrument: hdf5.Group, chunk: int) -> hdf5.Dataset:
     """The empty dataset of the drive, with chunks of `chunk` rows."""
-    # a 24-bit mantissa resolves full scale 256 times more finely than a 16-bit converter, so the played values are
-    # preserved
+    # float32 preserves the output: its 24-bit mantissa resolves full scale 256 times more finely than a 16-bit
+    # converter
     drive = hdf5.create_group(instrument, "drive", "NXcollection")
     voltage = hdf5.grow_numbers(
         drive, "voltage", np.float32, unit="V", description="drive as sent to the amplifier", chunk=chunk, compress=True

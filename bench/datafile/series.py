@@ -52,7 +52,7 @@ class Series:
         return np.asarray(self[:], dtype=dtype)
 
     def pieces(self, size: int = ROWS_AT_ONCE) -> Iterator[NDArray[Any]]:
-        """The values in order, at most `size` at once."""
+        """Yields the values in order, in arrays of at most `size` values."""
         for start in range(0, len(self), size):
             yield self[start : start + size]
 
@@ -95,12 +95,12 @@ class SampleReader:
 
     @cached_property
     def channels(self) -> tuple[Channel, ...]:
-        """The inputs, in the order of the rig."""
+        """The input channels, in the order of the rig."""
         return read_channels(self._instrument)
 
     @property
     def rows(self) -> int:
-        """Number of samples of every channel and the drive."""
+        """Number of complete samples, the same for every channel and the drive."""
         stored = [self._counts(channel.name) for channel in self.channels]
         stored.append(hdf5.dataset(self._instrument, "drive/voltage"))
         return min(self._complete("samples"), *(data.shape[0] for data in stored))
@@ -119,8 +119,8 @@ class SampleReader:
 
     @cached_property
     def blocks(self) -> dict[str, NDArray[Any]]:
-        """Starts of the blocks, as the arrays `row`, `run`, `first` (sample index in the run) and `time` [s] at which
-        the block was read.
+        """Start of each block, as the arrays `row`, `run`, `first` (sample index in the run) and `time` (when the block
+        was read [s]).
         """
         stored = {name: hdf5.dataset(self._instrument, f"blocks/{name}") for name in ("row", "run", "first", "time")}
         columns = {name: hdf5.read(each, slice(None)) for name, each in stored.items()}
@@ -162,8 +162,8 @@ class SampleReader:
         return RecordedRun(number, rows, series, drive, Series("time", "time since arming", "s", self.time, rows))
 
     def raw_values(self, name: str, run: int) -> RawValues:
-        """The values received in `run` from the channel's sensor, if its clock is free-running; empty for any other
-        channel.
+        """The values received in `run` from the sensor of channel `name`, if its clock is free-running; otherwise
+        empty.
         """
         sensor = [channel.name for channel in self.channels].index(self._channel_named(name).name)
         columns = ("index", "time", "code", "arrival")
@@ -180,10 +180,10 @@ class SampleReader:
 
     @cached_property
     def counted(self) -> Mapping[str, int]:
-        """Number of complete rows of every part, regardless of the length of its datasets; older files have fewer
-        parts.
+        """Number of complete rows of each part, which may be less than the length of its datasets; older files have
+        fewer parts.
 
-        It is read once, before the data, for a consistent view of a growing file.
+        Read once, before the data, for a consistent view of a growing file.
         """
         return counts(self._entry)
 

@@ -2,8 +2,8 @@
 # pyright: reportUnknownArgumentType=false
 """Validation of the structure of an untrusted file before its contents are read.
 
-Values, link targets and external storage are not accessed. Reading the structures rejected here would take hours or all
-memory, crash the process, or open other files.
+Values, link targets and external storage are not accessed. Reading the structures that are rejected here would take
+hours, exhaust the memory, crash the process, or open other files.
 """
 
 from collections.abc import Sequence
@@ -32,7 +32,7 @@ LARGEST_VALUE = 2**24
 UNPACKED = 200
 """Largest ratio of the size of all values to that of the file; constant columns are compressed about a hundredfold."""
 SPARE = 2**26
-"""Total size of the values [bytes] up to which the limit `UNPACKED` does not apply."""
+"""Size of values [bytes] that is allowed in addition to the ratio `UNPACKED`, so that small files pass."""
 FILTERS = frozenset({1, 2, 3})
 """Compression, shuffling and checksum filters built into HDF5; HDF5 would load any other filter as a plug-in."""
 KINDS = frozenset("iufSb")
@@ -40,7 +40,7 @@ KINDS = frozenset("iufSb")
 
 
 class _Judge:
-    """Checks every object of a file of `size` bytes, each once."""
+    """Checks the objects of a file of `size` bytes and counts them and their values."""
 
     def __init__(self, size: int) -> None:
         self._size = size
@@ -126,10 +126,10 @@ class _Judge:
         self._values += int(stored.nbytes)
         if self._values > UNPACKED * self._size + SPARE:
             claim = f"the datasets up to {path} declare {self._values} bytes of values in a file of {self._size} bytes"
-            raise DataFileError(f"{claim}: it is truncated or invalid")
+            raise DataFileError(f"{claim}: the file is truncated or invalid")
 
     def _view(self, made: Any, path: str) -> None:
-        """Check that a view refers to this file and is in the group for views."""
+        """Raise DataFileError unless a virtual dataset refers only to this file and is in the group of fit views."""
         if not path.startswith(f"/entry/{FIT_VIEWS}/"):
             raise DataFileError(f"{path} is a virtual dataset; only views of fits may be virtual")
         for number in range(made.get_virtual_count()):
@@ -151,8 +151,8 @@ def check_attributes(owner: Any, path: str) -> None:
 
 
 def check_structure(file: File, path: Path, only: Sequence[str] = ()) -> None:
-    """Raise DataFileError, naming the object, for a structure that this program never writes; of the members of
-    /entry, only those that are named are checked, if `only` is given.
+    """Raise DataFileError, naming the object, for a structure that this program never writes. If `only` is given, only
+    these members of /entry and the objects below them are checked.
 
     Unreadable members are left to the readers and to recovery.
     """

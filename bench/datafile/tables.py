@@ -33,7 +33,9 @@ def check(name: str, table: Table) -> None:
         item, values = f"column {key} of table {name}", column.values
         if values.ndim != 1 or values.dtype.kind not in "fiubU":
             raise InvalidInput(
-                item, (values.shape, str(values.dtype)), "it must be a one-dimensional array of numbers or strings"
+                item,
+                (values.shape, str(values.dtype)),
+                "it must be a one-dimensional array of numbers, booleans or strings",
             )
         if values.dtype.kind in "fiu" and not column.unit:
             raise InvalidInput(item, column.unit, 'numbers need a unit, "1" for pure numbers')
@@ -80,5 +82,5 @@ def as_rows(columns: Mapping[str, Sequence[Any]]) -> list[dict[str, Any]]:
 
 
 def arrays(table: Table) -> dict[str, NDArray[Any]]:
-    """The values of a table by name, for drawing."""
+    """Values of the columns by name, for drawing."""
     return {name: column.values for name, column in table.items()}

@@ -34,7 +34,7 @@ from sim.errors import InvalidInput
 
 
 def journal_path(path: Path) -> Path:
-    """The journal of the data file `path`: the same name, ending in .events.jsonl."""
+    """Path of the journal of the data file `path`: the same name, ending in .events.jsonl."""
     return path.with_suffix(".events.jsonl")
 
 
@@ -46,7 +46,7 @@ class JournalWriter:
         self._written = False
 
     def add(self, time: float, kind: str, text: str, more: Mapping[str, Any]) -> None:
-        """Append one event at `time` [s], with `more` as additional content."""
+        """Append one event at `time` [s], with the additional keys of `more`."""
         line = json.dumps({"time": time, "kind": kind, "text": text, **more}, ensure_ascii=False) + "\n"
         # one unbuffered call per line, so that a killed program leaves complete lines
         os.write(self._handle, line.encode())
@@ -66,7 +66,7 @@ class JournalWriter:
 
 
 def read_journal(path: Path) -> Iterator[dict[str, Any]]:
-    """The lines of a journal before the first truncated or damaged one; empty if there is no journal."""
+    """Yields the parsed lines of a journal, up to the first truncated or damaged one; none if there is no journal."""
     if not path.is_file():
         return
     # not `splitlines`, because a text may contain other line separators
@@ -97,11 +97,11 @@ def _check_folder(folder: Path) -> None:
 
 
 class DataFileWriter:
-    """Creates the file and appends to it.
+    """Creates the file and its journal, and appends to them.
 
-    If the disk fails, the methods raise h5py's exceptions, mostly OSError. The constructor raises InvalidInput if the
-    file exists, cannot be created, or has contents that cannot be stored, and DataFileError if the disk fails during
-    creation.
+    If the disk fails, the methods raise h5py's exceptions, mostly OSError. The constructor raises InvalidInput if one
+    of the files exists or cannot be created, or if the skeleton has contents that cannot be stored, and DataFileError
+    if the disk fails during creation.
     """
 
     def __init__(self, path: Path, skeleton: Skeleton) -> None:
@@ -140,7 +140,9 @@ class DataFileWriter:
         self._point_fields = tuple(skeleton.point_type.model_fields)
 
     def has_table(self, event: type[Event]) -> bool:
-        """Whether the file has the table of the event, or the event has none; False for an invalid declaration."""
+        """Whether the file has a table for this type of event, or the type needs none; False for an invalid
+        declaration.
+        """
         try:
             return (table := event_table(event)) is None or table.name in self._parts.rows
         except InvalidInput:
@@ -168,7 +170,7 @@ class DataFileWriter:
         stored = self.has_table(type(event))
         if stored and (table := event_table(type(event))) is not None:
             if table.path in self._own:
-                # a recovery can create the table from the journal, without the protocol
+                # so that a recovery can create the table from the journal, without the protocol
                 more |= {"table": table.path, "fields": [asdict(each) for each in self._own.pop(table.path)]}
             for row in table.rows(event):
                 rows[table.name].add(*row)
@@ -196,7 +198,7 @@ class DataFileWriter:
         self._journal.add(event.time, kind, text, more)
 
     def commit(self, *, partial: bool) -> None:
-        """Write pending rows to the disk, visible to readers; incomplete chunks of samples only if `partial`."""
+        """Write pending rows to the disk, visible to readers; incomplete compressed chunks only if `partial`."""
         samples, tables = self._parts.samples, self._parts.rows
         self._file_sync.check()
         wait_until_free(self._file_sync.touch)
@@ -226,7 +228,8 @@ class DataFileWriter:
         wait_until_free(self._file_sync.touch)
         self._file.close()
         if whole := len(self._parts.rows["fits"]):
-            # the data are complete without the views; if another program holds the file now, a recovery adds them later
+            # the data are complete without the views; if another program has locked the file, a recovery adds them
+            # later
             with suppress(OSError, RuntimeError), hdf5.open_to_extend(self._path) as file:
                 add_fit_views(hdf5.group(file, "entry"), whole)
         self._file_sync.sync()

@@ -17,7 +17,7 @@ from sim.parameters import Parameters
 from sim.specimen import Specimen
 
 AMPLITUDE_FACTOR = 1.01
-"""Amplitude A_s of the sine over g/lambda in the paper (Eq. 11)."""
+"""Amplitude A_s of the sine in the paper (Eq. 11), divided by g/lambda."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +43,7 @@ class Campaign:
 
     @cached_property
     def points(self) -> list[dict[str, Any]]:
-        """The results, absent values as None."""
+        """Rows of the results; absent values are None."""
         rows = self.record.points
         return [{name: None if value != value else value for name, value in row.items()} for row in rows]
 
@@ -54,33 +54,35 @@ class Campaign:
 
     @cached_property
     def harmonic_points(self) -> list[dict[str, Any]]:
-        """Points of steady sine tests, ascending in stiffness, then frequency."""
+        """Points of steady sine tests, in ascending order of stiffness ratio, then of frequency."""
         found = [row for row in self.points if "omega_rad_s" in row and "alpha_2" in row]
         return sorted(found, key=lambda row: (row["beta"], row["omega_rad_s"]))
 
     @cached_property
     def seismic_points(self) -> list[dict[str, Any]]:
-        """Points of earthquake records, by record, then ascending in stiffness."""
+        """Points of earthquake records, grouped by record, in ascending order of stiffness ratio."""
         found = [row for row in self.points if "record" in row and "alpha_2" in row]
         order = list(dict.fromkeys(row["record"] for row in found))
         return sorted(found, key=lambda row: (order.index(row["record"]), row["beta"]))
 
     @cached_property
     def amplitude_factor(self) -> float:
-        """Amplitude of the sine over g/lambda; the paper's if the file has no sine."""
+        """Amplitude of the sine divided by g/lambda; that of the paper if the file has no sine."""
         factor = self.parameters.get("amplitude_factor")
         return float(factor) if isinstance(factor, int | float) else AMPLITUDE_FACTOR
 
     @cached_property
     def specimen(self) -> Specimen:
-        """The specimen of the predictions. Raises InvalidInput if the file has none."""
+        """The specimen of the predictions. Raises InvalidInput if the file has none or an invalid one."""
         if "specimen" not in self.record.metadata:
-            raise InvalidInput("record", str(self.path), "it has no specimen, so a prediction is impossible")
+            raise InvalidInput("record", str(self.path), "the file has no specimen, so a prediction is impossible")
         return validated(Specimen, self._json("specimen"), lambda where: f"{self.path.name}: specimen.{dotted(where)}")
 
     @cached_property
     def uncertainty(self) -> SpecimenUncertainty:
-        """Half widths of the specimen's parameters; the default if the file has none."""
+        """Half widths of the uncertainty intervals of the specimen's parameters; the default values if this version
+        cannot read the configuration.
+        """
         return SpecimenUncertainty() if self.configuration is None else self.configuration.uncertainty
 
     @cached_property
@@ -98,12 +100,14 @@ class Campaign:
 
     @cached_property
     def devices(self) -> Mapping[str, Any]:
-        """Devices of the bench."""
+        """Devices of the bench, as recorded at the start of the run."""
         return self._json("devices")
 
     def _json(self, name: str) -> dict[str, Any]:
         try:
             found = json.loads(self.record.metadata.get(name, "{}"))
         except json.JSONDecodeError as error:
-            raise InvalidInput("record", str(self.path), f"its entry {name!r} is not valid JSON: {error}") from None
+            raise InvalidInput(
+                "record", str(self.path), f"the entry {name!r} of the file is not valid JSON: {error}"
+            ) from None
         return cast(dict[str, Any], found) if isinstance(found, dict) else {}

@@ -10,7 +10,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Column:
-    """A table column: title, unit ("" for text and pure numbers), and whether it contains words."""
+    """A table column: title, unit ("" for text and pure numbers), and whether its cells are words, which are
+    left-aligned.
+    """
 
     title: str
     unit: str = ""
@@ -85,8 +87,8 @@ def template_content(document: Document, draw: Callable[[Picture, int], Any]) ->
     """Returns title, provenance, summary and sections (key, heading, parts) for a template.
 
     A part is a dictionary whose `kind` is "text", "notice", "listing", "table" or "picture". Tables and figures are
-    numbered separately: their `name` is "Table 3" or "Fig. 2". `draw` takes a figure and its number and returns the
-    template's `drawing`.
+    numbered separately: their `name` is "Table 3" or "Fig. 2". `draw` receives a picture and its number and returns its
+    `drawing` for the template.
     """
     counts = {"Table": 0, "Fig.": 0}
 

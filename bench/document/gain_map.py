@@ -19,11 +19,11 @@ ranges.
 """
 
 MOST = 20_000
-"""Largest number of points of a map."""
+"""Maximum number of points of a map."""
 
 
 def map_section(specimen: Specimen, amplitude_factor: float, measured: Sequence[MapPoint] = ()) -> Section:
-    """Surface and map of both steady motions, with the measured points."""
+    """Section with the gain surfaces and maps of both steady motions, rocking and resting, and the measured points."""
     request = MapRequest(
         omega=_axis(LOW, HIGH, STEP, [point.omega for point in measured], 0.5),
         beta=_axis(BETA_LOW, BETA_HIGH, BETA_STEP, [point.beta for point in measured], 0.05),
@@ -43,13 +43,13 @@ def map_section(specimen: Specimen, amplitude_factor: float, measured: Sequence[
     text = (
         f"Steady motions under a sine of {amplitude:.4g} m/s² ({amplitude_factor:g} g/λ), computed as "
         f"periodic orbits at {len(request.omega)} frequencies by {len(request.beta)} stiffnesses, with their "
-        "stability. Where the block may rest, two steady motions exist, and the start of a test decides "
-        "which one it reaches. In the hatched areas the rocking motion is unstable: a test shows a modulated "
+        "stability. Where the block may rest, two steady motions exist, and the start of a test determines "
+        "which one is reached. In the hatched areas the rocking motion is unstable: a test shows a modulated "
         "motion, or the block topples."
     )
     parts: list[Part] = [text]
     if lost:
-        parts.append(f"No rocking orbit was found at {lost} points, which are blank.")
+        parts.append(f"Number of blank points, at which no rocking orbit was found: {lost}.")
     found = " Circles are measured points with their α₂." if measured else ""
     description = "Surfaces and contour maps of alpha 1 and alpha 2 over frequency and stiffness ratio."
     parts.append(Picture(figure, f"Gain surfaces (a) and maps (b, c) of α₁ and α₂, predicted.{found}", description))
@@ -58,7 +58,7 @@ def map_section(specimen: Specimen, amplitude_factor: float, measured: Sequence[
 
 def _axis(low: float, high: float, step: float, places: Sequence[float], margin: float) -> tuple[float, ...]:
     """Equally spaced values over the range `low` to `high`, extended to include the measured `places` with a `margin`.
-    The spacing exceeds `step` if the values would be too many.
+    The spacing exceeds `step` if there would otherwise be too many values.
     """
     least = min([low, *(place - margin for place in places if place < low)])
     most = max([high, *(place + margin for place in places if place > high)])

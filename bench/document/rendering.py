@@ -37,7 +37,7 @@ def html_page(document: Document) -> str:
     from jinja2 import Environment, PackageLoader, StrictUndefined
     from markupsafe import Markup
 
-    # matplotlib's output, in which text is outlines; all other text is escaped by the template
+    # matplotlib's SVG is safe because its text is outlines or escaped; the template escapes all other text
     content = template_content(document, lambda picture, number: Markup(_inline_svg(picture, number)))
     environment = Environment(
         loader=PackageLoader("bench.document", ""),
@@ -51,7 +51,7 @@ def html_page(document: Document) -> str:
 
 
 def write_pdf(path: Path, document: Document) -> None:
-    """Write the pages to `path`, replacing any existing file. Every figure is drawn at its own size."""
+    """Write the pages to `path`, replacing any existing file. Figures larger than a page are drawn smaller."""
     import matplotlib
     import typst
 
@@ -70,14 +70,14 @@ def write_pdf(path: Path, document: Document) -> None:
 
 
 def _inline_svg(picture: Picture, number: int) -> str:
-    """An `<svg>` element without header and references, with identifiers unique on the page.
+    """An `<svg>` element without XML header and unused identifiers; the used ones are unique on the page.
 
     Letters are outlines and need no fonts; title and description are for screen readers.
     """
     import matplotlib
 
     text, prefix = io.StringIO(), f"f{number}"
-    # the salt makes the identifiers the same in every run
+    # a fixed salt gives the same identifiers in every run
     with matplotlib.rc_context({"svg.fonttype": "path", "svg.hashsalt": "rockbench"}):
         metadata = {"Date": None, "Creator": None, "Format": None, "Type": None}
         picture.figure.savefig(text, format="svg", metadata=metadata)
@@ -86,9 +86,9 @@ def _inline_svg(picture: Picture, number: int) -> str:
     used = {name for _, name in _REFERENCE.findall(body)}
     body = _IDENTIFIER.sub(lambda found: f' id="{prefix}-{found[1]}"' if found[1] in used else "", body)
     body = _REFERENCE.sub(rf"\g<1>#{prefix}-\g<2>", body)
-    # a hundredth of a point is finer than printers resolve
+    # two decimals suffice: printers do not resolve a hundredth of a point
     body = _OUTLINE.sub(lambda found: found[1] + _DIGITS.sub(r"\1", found[2]) + found[3], body)
-    # the page's style sheet has this rule
+    # the style sheet of the page already contains this rule
     body = _RULE.sub("", body)
     body = re.sub(r"<!--.*?-->\s*", "", body, flags=re.DOTALL)
     attributes = f'role="img" aria-labelledby="{prefix}-title {prefix}-text"'

@@ -1,4 +1,4 @@
-"""Typography of a report: numbers with uncertainties, symbols, units, dates, counted nouns."""
+"""Typography of a report: numbers with uncertainties, symbols, units, dates, singular and plural nouns."""
 
 import re
 from datetime import datetime, timedelta
@@ -47,7 +47,7 @@ _SUFFIX = re.compile(r"_(?:rad_s|rad|n_m|m_s2|hz)$")
 """Units at the end of the name of a field."""
 
 _SMALL = re.compile(r"(?<=\d )u(?=[ms](?:\W|$))")
-"""The prefix of micrometres and microseconds."""
+"""The letter u as the prefix micro, in micrometres and microseconds."""
 
 
 def plain(value: float | None, digits: int = 4) -> str:
@@ -71,14 +71,14 @@ def with_uncertainty(value: float | None, uncertainty: float | None) -> str:
 
 
 def percent(share: float | None, places: int = 2) -> str:
-    """A ratio in percent, with its sign."""
+    """A ratio in percent, with its sign; a dash if absent."""
     if share is None or not isfinite(share):
         return ABSENT
     return f"{100.0 * share:+.{places}f}".replace("-", MINUS)
 
 
 def yes_or_no(value: bool | None) -> str:
-    """A Boolean as a word."""
+    """A Boolean as the word yes or NO; a dash if absent."""
     return ABSENT if value is None else "yes" if value else "NO"
 
 
@@ -94,8 +94,8 @@ def without_unit(name: str, unit: str) -> str:
 
 
 def typeset(text: str) -> str:
-    """A line of a journal or a summary with typeset symbols, units and signs: α₂, Ω, m/s², ±. Names of channels and
-    parameters are words: laser 1.
+    """A line of a journal or summary with typeset symbols, units and signs (α₂, Ω, m/s², ±), and with the names of
+    channels and parameters as words (laser 1).
     """
     text = _WORDS.sub(lambda found: _SYMBOLS[found[1]], text.replace("+-", "±"))
     text = _SMALL.sub("µ", _NAME.sub(lambda found: _printed(found[0]), text))
@@ -106,7 +106,7 @@ def typeset(text: str) -> str:
 
 
 def _printed(name: str) -> str:
-    """A name as words, without its unit, with its symbol: α₂ low for `alpha_2_low`."""
+    """A name as words without its unit, typeset if it is a symbol: α₂ low for `alpha_2_low`."""
     words = _SUFFIX.sub("", name)
     symbol = next((each for each in _SYMBOLS if words == each or words.startswith(f"{each}_")), "")
     return _SYMBOLS.get(symbol, "") + words[len(symbol) :].replace("_", " ")
@@ -125,7 +125,7 @@ def moment(iso: str) -> str:
 
 
 def counted(number: int, one: str, more: str = "") -> str:
-    """A number with its noun: 1 point, 2 points."""
+    """A number with its noun in the singular or plural: 1 point, 2 points."""
     return f"{number} {one if number == 1 else more or one + 's'}"
 
 

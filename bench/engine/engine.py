@@ -55,7 +55,7 @@ class Engine:
         self._prepared = PreparedDrive(self._loop, guard, stream)
         self._specimen: Specimen | None = None
         self.returned: object = None
-        """Value returned by the plan; None if the plan was interrupted."""
+        """Value returned by the plan; None if the plan did not run to its end."""
         requests.cut_by(rig.halt)
 
     @property
@@ -64,10 +64,10 @@ class Engine:
         return self._output.state
 
     def run(self, plan: Plan) -> Ending:
-        """Run `plan` to its end, or until it is ended early.
+        """Run `plan` to its end, or until a request, an exceeded limit or an error ends it. Returns the ending.
 
-        An error of the rig, data file, plan or analysis is returned as an ending. After any other error, the output is
-        cut and the error is raised.
+        An error of the rig, data file, plan or analysis is returned as an ending. After any other error, the enable
+        line is cut and the error is raised again.
         """
         ending_of = self._output.ending_of
         try:

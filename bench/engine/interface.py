@@ -26,7 +26,7 @@ class Ending:
 
     @classmethod
     def failed(cls, error: RockbenchError) -> "Ending":
-        """Ending caused by an error."""
+        """Ending with status "failed", caused by an error."""
         return cls("failed", str(error), error.cause)
 
     def then(self, later: "Ending | None") -> "Ending":
@@ -79,7 +79,7 @@ _Made = tuple[str, Cause]
 
 
 class Requests:
-    """Requests to end a run, from any thread or signal handler: stop, abort and halt, in ascending strength.
+    """Requests to end a run, from any thread or signal handler: stop, abort and halt, in order of severity.
 
     A request is never withdrawn. Plain flags are used because they need no lock, which could deadlock in a signal
     handler.
@@ -91,10 +91,11 @@ class Requests:
         self._halt: _Made | None = None
         self._cut: Callable[[], None] | None = None
         self.interrupted = False
-        """Whether a signal caused the request: the session then exits as soon as the rig is at rest."""
+        """Whether an operating-system signal caused the request: the session then exits as soon as the rig is at rest.
+        """
         self.breaking: Callable[[], BaseException] | None = None
-        """Constructor of the exception that a signal handler raises in the main thread after its request; None while
-        the loop polls for requests.
+        """Constructor of the exception that a signal handler raises in the main thread after making its request; None
+        while the loop polls for requests.
         """
         self.rig_closed = False
         """Whether no rig is open, so that the process may exit at once."""
@@ -124,11 +125,11 @@ class Requests:
         self._cut = cut
 
     def stop(self, why: str = "stop requested", code: CauseCode = CauseCode.REQUEST) -> None:
-        """Request the smooth ramp; the measurement remains valid. The first `why` is recorded as the reason."""
+        """Request a smooth ramp to zero; the measurement remains valid. The first `why` is recorded as the reason."""
         self._stop = self._stop or (why, Cause(code, "stop"))
 
     def abort(self, why: str = "abort requested", code: CauseCode = CauseCode.REQUEST) -> None:
-        """Request the fast ramp; the run becomes invalid."""
+        """Request a fast ramp to zero; the run becomes invalid."""
         self._abort = self._abort or (why, Cause(code, "abort"))
 
     def halt(self, why: str = "halt requested", code: CauseCode = CauseCode.REQUEST) -> None:
@@ -179,7 +180,7 @@ class EventStream:
         self._subscribers = tuple(subscribers)
         self._stores, self._published = stores, set[type[Event]]()
         self.points: list[Parameters] = []
-        """Finished points, in order."""
+        """Results of the finished points, in order."""
 
     def join(self, subscriber: Subscriber) -> None:
         """Add a subscriber; subscribers are called in the order in which they were added."""

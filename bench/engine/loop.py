@@ -46,12 +46,12 @@ class Loop:
         self.output = output
         self._guard, self._stream, self._requests = guard, stream, requests
         self.fall: FallWatch | None = None
-        """Detector of a fall of the mounted block; None if no specimen is mounted."""
+        """Detector of the fall of the mounted block; None if no specimen is mounted."""
         self._over: Violation | None = None
         self._runaway: Violation | None = None
 
     def begin(self, reason: str) -> None:
-        """Arm the rig with zeros queued."""
+        """Arm the rig with samples of 0 V queued."""
         self._over = self._runaway = None
         self.check_requests()
         self.output.arm(reason)
@@ -75,7 +75,7 @@ class Loop:
 
     def signals(self) -> tuple[NDArray[np.float64], bool]:
         """Run one iteration. Returns signals, shape (block, len(SIGNALS)), and whether the rocking block has fallen."""
-        # missing samples of a further channel must not invalidate the plan's cycles
+        # only the standard signals: missing samples of an additional channel must not invalidate the plan's cycles
         signals = self.exchange().signals[:, : len(SIGNALS)]
         return signals, self.fall is not None and self.fall.fallen(signals)
 
@@ -98,7 +98,9 @@ class Loop:
         return fell
 
     def ramp_out(self, way: State, reason: str, cause: Cause = UNKNOWN) -> bool:
-        """Bring the output to zero along the ramp for `way` and stop the rig. Returns whether the block fell."""
+        """Ramp the output to zero, fast if `way` is ABORTING, otherwise smoothly, and stop the rig. Returns whether the
+        block fell. Halts the bench if the table still exceeds a limit at the end.
+        """
         begin = self._guard.abort if way is State.ABORTING else self._guard.stop
         begin()
         if self.output.state is not way:
@@ -154,7 +156,7 @@ class AtRest:
         self._loop.output.machine.go(State.RUNNING, "storeys at rest, signals tared")
 
     def acquire(self, step: AcquireAtRest) -> RestSamples:
-        """Acquire samples. A violation ends the acquisition but not the plan, because the table is not driven."""
+        """Acquire samples. An exceeded limit ends the acquisition but not the plan, because the table is not driven."""
         output = self._loop.output
         self._loop.begin("acquisition with the output at zero")
         counts: list[Counts] = []
@@ -171,14 +173,16 @@ class AtRest:
             State.STOPPING, "the acquisition at rest is complete" if violation is None else str(violation)
         )
         alignments: tuple[Alignment, ...] = ()
-        # the end of the run reports such a failure
+        # if this fails, `rest` publishes a warning
         with suppress(RockbenchError):
             alignments = self._rig.alignments
         output.rest()
         return RestSamples(self._rig.channels, np.concatenate(counts), violation, alignments)
 
     def _stillness(self, step: Arm) -> NDArray[np.float64]:
-        """Channel values over an interval with the storeys at rest, shape (n, n_channels)."""
+        """Channel values, shape (n, n_channels), of the first interval in which the storeys are still, or of the last
+        one if they are still moving after `patience`.
+        """
         waited = 0.0
         while True:
             blocks = [self._loop.exchange() for _ in range(self._blocks(step.rest))]
@@ -206,7 +210,7 @@ class SineDrive:
         self._cycles = None
 
     def sweep(self, step: Sweep) -> Outcome:
-        """Drive the segments of the sweep, starting at the present amplitude and frequency."""
+        """Drive the segments of the sweep, starting at the current amplitude and frequency."""
         output = self._loop.output
         output.source.require_silence("segments")
         oscillator = output.source.oscillator

@@ -1,4 +1,4 @@
-"""Output of a bench: arming, block-by-block exchange, ramp-down and cut."""
+"""Output of a bench: arming, block-by-block exchange, ramp to zero, and cutting the enable line."""
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -77,7 +77,7 @@ class DriveSource:
         """Check a prepared drive.
 
         Raises InvalidInput unless it is one-dimensional, finite, zero at both ends and within the drive range, and the
-        present drive is zero.
+        current drive is zero.
         """
         if volts.ndim != 1 or volts.size == 0:
             raise InvalidInput("shape of a prepared drive", volts.shape, "it must be a non-empty one-dimensional array")
@@ -93,7 +93,7 @@ class DriveSource:
             )
         if self.oscillator.amplitude != 0.0 or self.oscillator.remaining > 0:
             asked = f"{self.oscillator.amplitude:g} m/s2"
-            raise InvalidInput("prepared drive during a sine of", asked, "ramp the sine to zero first")
+            raise InvalidInput("sine amplitude before a prepared drive", asked, "ramp the sine to zero first")
         self.require_silence("another prepared drive")
 
     def require_silence(self, wanted: str) -> None:
@@ -118,7 +118,7 @@ class Alignments:
         self._run: int | None = None
 
     def begin(self, run: int) -> None:
-        """Reset for a new run of the rig."""
+        """Note the number of the run that begins."""
         self._run = run
 
     def publish_values(self, run: int) -> None:
@@ -163,7 +163,7 @@ class Output:
         self.drive = np.zeros(0)
         """Drive [V] played while the last block was acquired, shape (block,)."""
         self.read = 0
-        """Samples read since the rig was armed."""
+        """Number of samples read since the rig was armed."""
         self._run = 0
         self.stalls: Stalls | None = None
         """Detector of stalls, periods in which the program did not run; None in virtual time."""
@@ -190,7 +190,7 @@ class Output:
         return self.read + self._rig.lead
 
     def arm(self, reason: str) -> None:
-        """Arm the rig with zeros queued."""
+        """Arm the rig with samples of 0 V queued."""
         self.source.reset()
         self.read = 0
         self._run += 1
@@ -200,7 +200,7 @@ class Output:
         self._alignments.begin(self._run)
 
     def exchange(self) -> Exchange:
-        """Drive and read one block; an open safety input halts the bench."""
+        """Send and read one block; an open safety input halts the bench."""
         try:
             exchange = self._guard.exchange(self.source.next(self.block))
         except RigError as error:
@@ -263,7 +263,7 @@ class Output:
             return ended.ending
         except RigError as error:
             if self._requests.strongest == "halt" and self.driven:
-                # the requesting thread cut the rig during the iteration
+                # the requesting thread cut the enable line during the iteration
                 return self.cut(Ending("halted", self._requests.reason, self._requests.cause))
             return self.cut(Ending.failed(error))
         except RockbenchError as error:
@@ -275,7 +275,9 @@ class Output:
         return None
 
     def rescue(self, error: BaseException, lasts: Sequence[Callable[[], object]]) -> None:
-        """Cut the output before `error` is raised, then call each of `lasts`. Further errors become its notes."""
+        """Cut the output before `error` is raised, then call each of `lasts`. Further errors are added to `error` as
+        notes.
+        """
         ending = Ending("failed", f"{type(error).__name__} in the plan or a subscriber")
         for last in (lambda: self.cut(ending), *lasts):
             try:

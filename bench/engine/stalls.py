@@ -8,7 +8,7 @@ from drivers.clock import now
 from sim import waiting
 
 LONGEST = 0.1
-"""Longest delay of the thread that is not recorded as a stall [s]: the default lead of the drive."""
+"""Maximum delay of the thread [s] that is not recorded as a stall; equal to the default lead of the drive."""
 _PERIOD = 0.02
 _KEPT = 16
 

@@ -21,8 +21,8 @@ from sim.specimen import Specimen
 class OperatorAction:
     """Action, described by `request`, that the operator carries out on the bench at rest. Returns `Done`.
 
-    `specimen` is the specimen on the table afterwards. `amount` is the amount involved in the task, see
-    `drivers.rig.OperatorTask`; by default the nominal stiffness [N/m] of the specimen's spring, if it has one.
+    `specimen` is the specimen on the table afterwards. The meaning of `amount` depends on the task, see
+    `drivers.rig.OperatorTask`; the default is the nominal stiffness [N/m] of the specimen's spring, if it has one.
     """
 
     work: OperatorTask
@@ -35,8 +35,8 @@ class OperatorAction:
 class Arm:
     """Arm the rig with the output at zero, wait until the storeys are still, and tare every signal.
 
-    The storeys are still when neither u1 nor the drift scatters by more than `still` [m] over `rest` seconds. After
-    `patience` seconds the signals are tared regardless, with a warning.
+    The storeys are still when the standard deviations of u1 and the drift over `rest` seconds are at most `still` [m].
+    After `patience` seconds the signals are tared regardless, with a warning.
     """
 
     rest: float
@@ -63,7 +63,7 @@ class Calibrate:
 
 @dataclass(frozen=True)
 class Sweep:
-    """Sweep along `segments` from the present sine. Returns `Fallen` as soon as the block has fallen, else `Done`."""
+    """Sweep along `segments` from the current sine. Returns `Fallen` as soon as the block has fallen, else `Done`."""
 
     segments: tuple[Segment, ...]
 
@@ -85,7 +85,7 @@ class SetHarmonics:
     """Change smoothly to `shares`: complex fractions of the set amplitude for the fundamental, second harmonic and so
     on, as in `bench.control.oscillator`. A `Sweep` resets them.
 
-    The change lasts `blend` cycles. It begins at the start of cycle number `cycle` of the present count, or at once if
+    The change lasts `blend` cycles. It begins at the start of cycle number `cycle` of the current count, or at once if
     `cycle` is None or that cycle has begun.
     """
 
@@ -169,7 +169,7 @@ class RestSamples:
     """Counts of all inputs with the output at zero, shape (n, n_channels).
 
     `violation` is the exceeded limit that ended the acquisition, if any; the plan continues. `alignments` are those of
-    the sensors with their own clocks, at its end.
+    the free-running sensors to the sample clock at the end of the acquisition.
     """
 
     channels: tuple[Channel, ...]

@@ -20,8 +20,8 @@ def attractor_figure(points: Mapping[str, NDArray[Any]], gains: Sequence[NDArray
     """Gains of long-term motions against frequency. A dot is the peak of a cycle; the line is the orbit, dashed where
     it is unstable on the shake table.
 
-    `points` are the columns of the table from `bench.prediction.attractors`; `gains` are those of the last cycles for
-    each of its rows, empty after a fall.
+    `points` are the columns of the table from `bench.prediction.attractors`; `gains` are those of the last cycles of
+    the motion in each row of the table, empty after a fall.
     """
     betas = np.unique(points["beta"])
     across = min(COLUMNS, betas.size)

@@ -23,7 +23,7 @@ def budget_figure(
     `budgets` are the standard uncertainties of each bar by contribution; `expanded` are the lengths of the bars [%].
     """
     total = {name: sum(budget.get(name, 0.0) ** 2 for budget in budgets) for budget in budgets for name in budget}
-    # with few bars, the legend beside them is the highest part
+    # with few bars, the legend to their right is taller than they are
     figure = new_figure(6.8, max(1.2 + 0.22 * len(labels), 0.6 + 0.18 * len(total)))
     panel = figure.subplots()
     rows = range(len(labels))

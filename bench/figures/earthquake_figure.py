@@ -61,8 +61,8 @@ def gain_figure(points: Sequence[PointLike], prediction: Mapping[str, NDArray[An
     """alpha_2 against beta, one panel per record.
 
     `points` have the fields of an earthquake point; `prediction` has record, beta and alpha_2 under the requested
-    motion (NaN where the block topples, marked by a short stroke). Intervals contain 95 % of the expected measurements;
-    a cross at the upper edge marks a point without a gain, with its status.
+    motion (NaN where the block topples, marked by a short stroke). A wide bar is the 95 % interval expected for the
+    measured value; a cross near the upper edge marks a point without a gain, with its status.
     """
     rows = plain(points)
     names = list(dict.fromkeys([str(name) for name in prediction["record"]] + [str(row["record"]) for row in rows]))
@@ -219,7 +219,7 @@ def _finish(figure: "Figure", panels: "Sequence[Axes]", count: int) -> None:
         panels[0].text(0.5, 0.5, "no record was played", ha="center", va="center")
         return
     panels[-1].set_xlabel(r"$t$  [s]", fontsize=8)
-    # a record that toppled the block or was not played lacks some curves
+    # from all panels, because curves are missing for a record that toppled the block or was not played
     labels = {label for panel in panels[:count] for label in panel.get_legend_handles_labels()[1]}
     add_legend(figure, panels[:count], len(labels) if len(labels) < 4 else 2)
 

@@ -24,7 +24,8 @@ PREFIXED = {"m": ((1e-3, "µm", 1e6), (1.0, "mm", 1e3)), "rad": ((1.0, "mrad", 1
 """For each unit: upper limits of the values, with the prefixed unit and the factor that apply below each."""
 
 APART = 8.0
-"""Largest ratio of a panel's span to the span of any column in the panel."""
+"""Maximum ratio of a panel's range of values to that of any of its columns; otherwise the columns are drawn separately.
+"""
 
 UNCERTAINTY, COVERAGE = "_uncertainty", 2.0
 """Suffix of the columns that are drawn as error bars of other columns, and the coverage factor of the bars."""
@@ -88,7 +89,7 @@ def _ends(values: NDArray[np.float64]) -> tuple[float, float]:
 
 
 def _scaled(fit: FitFinished, names: list[str]) -> tuple[str, float]:
-    """Prefixed unit and factor of the drawn values."""
+    """Unit with prefix, and the factor that converts values to it for drawing."""
     unit = fit.columns[names[0]].unit
     size = max(abs(end) for name in names for end in _ends(fit.columns[name].values))
     return next(((there, factor) for below, there, factor in PREFIXED.get(unit, ()) if size < below), (unit, 1.0))

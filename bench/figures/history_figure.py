@@ -23,7 +23,7 @@ class Motion:
     """A motion and its time histories.
 
     name : start of the motion, or kind of steady motion.
-    status : end of the motion.
+    status : how the motion ended.
     values : time_s, drift_m, bare_drift_m, u1_m and theta_rad, each of shape (n,); NaN after a fall.
     """
 
@@ -83,7 +83,7 @@ def _draw_block(panel: "Axes", motion: Motion) -> "Axes":
 
 
 def _before_the_fall(motion: Motion) -> NDArray[np.float64]:
-    """Angles that set the panel's scale; those of a falling block are clipped."""
+    """Angles that set the scale of the panel: all or, before a fall, those up to the last sign change, times 1.6."""
     theta = motion.values["theta_rad"]
     if np.isfinite(theta).all():
         return theta

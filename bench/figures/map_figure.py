@@ -30,11 +30,11 @@ GAINING, LOSING = "#DCEBF5", "#B9B9B9"
 """Colours of the gain: light where the block reduces the response, dark where it does not."""
 
 FEWEST_LEVELS = 4
-"""Least number of usual contour levels that a gain must cross; if it crosses fewer, other levels are drawn."""
+"""Minimum number of the usual contour levels within the range of a gain; if there are fewer, other levels are drawn."""
 
 JUMP = 0.1
-"""Step in the frequency of least gain, as a fraction of the frequency range, above which it is treated as a jump
-between valleys.
+"""Difference between the frequencies of least gain of adjacent stiffnesses, as a fraction of the frequency range, above
+which the line through them is broken.
 """
 
 FOUND, LOST = "o", "X"
@@ -88,7 +88,7 @@ def map_figure(
     """Surfaces (a), map of the rocking motion (b) and map of the resting motion (c), for alpha_1 and alpha_2.
 
     `omegas` [rad/s], shape (m,), and `betas`, shape (n,), are ascending. `resting_margin`, shape (n, m), is positive
-    where the block may rest. `measured` points are drawn in the maps of alpha_2, each on its branch.
+    where the block may rest. `measured` points are drawn on the surface and the maps of alpha_2, each on its branch.
     """
     branches = [("b", "block rocking", rocking)]
     if resting.exists:
@@ -168,7 +168,7 @@ def _draw_measured(panel: "Axes", points: Sequence[MapPoint]) -> None:
             color=BLUE,
             zorder=7,
         )
-        # legible on contour lines
+        # keep the text legible on contour lines
         text.set_path_effects([withStroke(linewidth=2.0, foreground="white")])
 
 
@@ -199,7 +199,7 @@ def _draw_map(
         panel.contour(
             omegas, betas, resting_margin, levels=[0.0], colors=GREEN, linewidths=1.6, linestyles=[(0, (6, 1.5))]
         )
-    # break the line where the least gain jumps from one valley to another
+    # break the line where the frequency of least gain jumps from one valley to another
     least = least_over_omega(omegas, branch.gains[name])
     jumps = np.flatnonzero(np.abs(np.diff(least)) > JUMP * (omegas[-1] - omegas[0])) + 1
     panel.plot(
@@ -252,7 +252,7 @@ def _add_legend(figure: "Figure", unstable: bool, boundary: bool, measured: Sequ
 def least_over_omega(omegas: Floats, gain: Floats) -> Floats:
     """Frequency [rad/s], shape (n,), of the least `gain`, shape (n, m), within the range of `omegas`, shape (m,).
 
-    Fits a parabola to three points of log(gain); NaN where the least value lies on the edge or its neighbours
+    Fits a parabola to three points of log(gain); NaN where the least value is at the edge or its neighbours
     are absent.
     """
     least = np.full(len(gain), np.nan)

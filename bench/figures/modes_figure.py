@@ -141,7 +141,7 @@ def _shapes(modes: Modes, betas: NDArray[np.float64], specimen: Specimen) -> "Fi
     """
     columns = len(betas) + 1
     figure = new_figure(columns * SKETCH[0], 3 * SKETCH[1] + 0.5)
-    # equal axes shrink after the layout: reserve space for titles
+    # axes of equal scale shrink after the layout: reserve space for titles
     layout: Any = figure.get_layout_engine()
     layout.set(h_pad=0.1)
     bare = np.flatnonzero(modes["system"] == "bare")

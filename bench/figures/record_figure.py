@@ -1,5 +1,5 @@
 # pyright: reportUnknownMemberType=false
-"""Earthquake records: time histories and response spectra, as recorded and as fitted to the table."""
+"""Earthquake records: time histories and response spectra, as recorded and as fitted to the table's stroke."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -40,10 +40,10 @@ MOST_POINTS = 4000
 """Largest number of drawn points; longer histories are drawn as the minima and maxima of equal intervals."""
 
 FIT_WIDTH, FIT_HEIGHT = 11.0, 6.0
-"""Size of the figure of a fit [inch]."""
+"""Width and height of the figure of a fit to the stroke [inch]."""
 
 FIT_COLOURS = (GREY, BLUE, VERMILLION)
-"""Colours of the motion before the fit and of the fits."""
+"""Colours of the motion before the fit, and of the fitted motions."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -39,7 +39,7 @@ DASHES = ("-", "--", "-.", ":")
 BAND_SHADE = 0.15
 
 LETTERS = 100
-"""Length of a legend line [characters]; the sample of the curve takes eight."""
+"""Length of a legend line [characters]; the drawn sample of the curve counts as eight."""
 
 PANELS, PANELS_WIDTH, PANEL_HEIGHT = 3, 9.5, 2.5
 """Panels per row; width of the figure and height of a row [inch]."""
@@ -78,8 +78,8 @@ class GainCurve:
 
 @dataclass(frozen=True, eq=False)
 class BandCurve:
-    """alpha_2 for one record and stiffness against the lower end of the band, `corner` [Hz], ascending; each of shape
-    (n,).
+    """alpha_2 under one record at one stiffness against `corner`, the lower end of the frequency band [Hz], in
+    ascending order; each of shape (n,).
 
     NaN where the run ended early; `toppled` is True where the block fell.
     """

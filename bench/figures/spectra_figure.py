@@ -44,8 +44,7 @@ LEGEND = (
 
 HEADROOM = 1.35
 FLOOR, CEILING = 0.01, 20.0
-"""Limits beyond which predicted gains do not extend the axis: no bench can distinguish such gains from 0 or from a
-resonance.
+"""Limits beyond which predicted gains do not extend the axis, because no bench can measure such small or large gains.
 """
 
 Prediction = Mapping[str, NDArray[Any]]
@@ -57,7 +56,8 @@ optionally the band of alpha_2: alpha_2_low, alpha_2_high.
 def gain_spectra(points: Sequence[PointLike], prediction: Prediction, *, title: str = "") -> "Figure":
     """Gain (logarithmic) against frequency.
 
-    `points` have the fields of a harmonic point. A point without a gain is a cross at the upper edge with its status.
+    `points` have the fields of a harmonic point. A point without a gain is drawn as a cross near the upper edge, with
+    its status.
     """
     rows = plain(points)
     betas = sorted({round(float(beta), 6) for beta in (*prediction["beta"], *(row["beta"] for row in rows))}) or [0.0]
@@ -167,7 +167,7 @@ def _ring_disagreeing(panel: "Axes", rows: list[dict[str, Any]]) -> None:
 
 
 def _draw_lost(panel: "Axes", rows: list[dict[str, Any]]) -> None:
-    """Draws a cross with the status at the upper edge for each point without a gain."""
+    """Draws a cross with the status near the upper edge for each point without a gain."""
     if rows:
         upwards = panel.get_xaxis_transform()
         panel.plot(

@@ -1,5 +1,7 @@
 # pyright: reportUnknownMemberType=false
-"""Modulus of the slowest multiplier against frequency, on fixed ground and on the table; one panel per stiffness."""
+"""Modulus of the slowest-decaying Floquet multiplier against frequency, on fixed ground and on the table; one panel per
+stiffness.
+"""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
@@ -19,7 +21,7 @@ Values = Mapping[str, NDArray[Any]]
 
 
 def stability_figure(points: Values, boundaries: Values) -> "Figure":
-    """Slowest multiplier against frequency; a circle marks a stability boundary.
+    """Slowest-decaying Floquet multiplier against frequency; a circle marks a stability boundary.
 
     `points` and `boundaries` are the columns of the tables from `bench.prediction.stability`.
     """

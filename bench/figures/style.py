@@ -21,7 +21,8 @@ if TYPE_CHECKING:
 
 DPI = 200
 
-# Okabe and Ito (2008): distinguishable with colour blindness; markers and dashes distinguish them in greyscale print
+# Okabe and Ito (2008): colours that colour-blind readers can distinguish; markers and dashes distinguish them in
+# greyscale print
 BLACK, BLUE, VERMILLION, GREEN, PURPLE, GREY = "#000000", "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#666666"
 ORANGE, SKY, PALE = "#E69F00", "#56B4E9", "#DDDDDD"
 
@@ -47,7 +48,7 @@ def new_figure(width: float, height: float) -> "Figure":
 
 
 def write_figure(path: Path, figure: "Figure") -> None:
-    """Saves in the format of the suffix: PNG at 200 dpi, PDF or SVG.
+    """Saves a figure in the format given by the suffix of `path`: PNG at 200 dpi, PDF or SVG.
 
     Raises InvalidInput if `path` exists and RockbenchError if it cannot be written.
     """

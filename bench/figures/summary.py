@@ -26,7 +26,7 @@ class Summary:
     """Contents of the summary.
 
     elapsed, bench_time : duration by the wall clock and by the bench's clock [s].
-    plan_hash : hash from the preflight (docs/preflight.md).
+    plan_hash : hash of the plan, computed in the preflight (docs/preflight.md).
     findings : the protocol's conclusions from its points.
     """
 

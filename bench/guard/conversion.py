@@ -23,7 +23,7 @@ class Extremes:
 
 
 class Conversion:
-    """Converts blocks of counts, all channels at once if no sample is missing."""
+    """Converts blocks of counts, all channels at once if all are linear and no sample is missing."""
 
     def __init__(self, channels: tuple[Channel, ...]) -> None:
         self._channels = channels
@@ -31,7 +31,7 @@ class Conversion:
         self._scale, self._offset = (np.array([getattr(each, key) for each in channels]) for key in ("scale", "offset"))
 
     def of(self, counts: Counts) -> tuple[Array, Extremes | None]:
-        """Convert counts, shape (n, n_channels), n > 0, to values, same shape; NaN where a count is not a measurement.
+        """Convert counts, shape (n, n_channels), n > 0, to values, same shape; NaN where a count is invalid.
 
         Returns the values and their extremes, or None instead of the extremes if any sample is missing.
         """

@@ -29,11 +29,11 @@ class Exchange:
 
     `values` are the block's channel values in their units, shape (n, n_channels), `signals` the signals of the
     experiment, shape (n, n_signals; 0 without a signal map), and `drive` [V], shape (n,), the samples played meanwhile.
-    `violation` is the exceeded limit, if any: one that cuts the enable line before that of a refused command, and this
-    before any other, of which the earliest is stated. `runaway` is the first exceeded limit that concerns the table
-    itself. `warnings` are the limits whose warning level was reached for the first time since arming. `opened` names
-    the open safety inputs; if there are any, the enable line has been cut. `magnitudes` returns the largest magnitude
-    of each watched quantity in the block, by key, for display.
+    `violation` is the exceeded limit, if any. If there are several, a limit that cuts the enable line takes precedence,
+    then that of a refused command, then the limit exceeded first. `runaway` is the first exceeded limit that concerns
+    the table itself. `warnings` are the limits whose warning level was reached for the first time since arming.
+    `opened` names the open safety inputs; if there are any, the enable line has been cut. `magnitudes` returns the
+    largest magnitude of each watched quantity in the block, by key, for display.
     """
 
     block: Block
@@ -101,7 +101,7 @@ class Guard:
         return self.ramping and self._gain(0) == 0.0 and not self._waiting.any() and self._zeros > self._owed
 
     def arm(self) -> None:
-        """Arm the rig with zeros queued. Raises RigError while a safety input is open."""
+        """Arm the rig with samples of 0 V queued. Raises SafetyInputOpen, a RigError, while a safety input is open."""
         if opened := self._opened():
             closing = "close every safety input, then start again"
             raise SafetyInputOpen(f"arming is refused: {', '.join(opened)} open; {closing}", opened)
@@ -121,7 +121,7 @@ class Guard:
         previous block is ramped to zero along the fast ramp.
         """
         if self._sending and self._held is None:
-            # the last exchange failed before its block was noted here: the commands of that block may not have been
+            # the last exchange failed before the guard recorded its block: the commands of that block may not have been
             # sent, and those of this block would then follow with a step
             self._held = self._command
             self._owed = volts.size
@@ -201,7 +201,8 @@ class Guard:
     def tare(self, values: NDArray[np.float64], *, drift: bool = True) -> None:
         """Take the mean of values at rest, shape (n, n_channels), as the zero of every signal.
 
-        From then on the drift is checked, unless it has no zero or `drift` is False because a laser is aimed elsewhere.
+        From then on the drift is checked, unless its zero is unknown or `drift` is False because a laser is aimed
+        elsewhere.
         """
         if self._signals is not None:
             self._signals.tare(values)
@@ -213,7 +214,7 @@ class Guard:
             self._begin(self._ramps.stop)
 
     def abort(self) -> None:
-        """Begin the fast ramp to zero; it replaces a slower ramp in progress, from that ramp's present value."""
+        """Begin the fast ramp to zero; it replaces a slower ramp in progress, from that ramp's current value."""
         fast = max(round(self._ramps.abort * self._rig.sample_rate), 1)
         if self._ramp_samples is None or self._ramp_samples - self._ramp_done > fast:
             self._begin(self._ramps.abort)
@@ -270,7 +271,7 @@ class Guard:
         return volts
 
     def _slewed(self, volts: NDArray[np.float64]) -> NDArray[np.float64]:
-        """`volts` with limited slew: the slew of a command may equal the limit, and the ramp adds to it."""
+        """`volts` with limited slew: the ramp adds to the slew of the commands, which may already equal the limit."""
         if np.abs(np.diff(volts, prepend=self._sent)).max() <= self._slew:
             return volts
         slowed, last = np.empty_like(volts), self._sent
@@ -283,7 +284,7 @@ class Guard:
         if self._signals is None:
             return np.empty((len(values), 0))
         if self._first_block:
-            # the drive is zero, so this block gives an approximate zero until the storeys are at rest
+            # the drive is zero, so the first block gives a provisional zero until the storeys are at rest
             self._signals.tare(values)
             self._first_block = False
         return self._signals.of(values)

@@ -11,7 +11,7 @@ from pydantic import model_validator
 from sim.errors import InvalidInput
 from sim.parameters import Parameters, quantity
 
-_SHARE = "share of the limit from which the operator is warned"
+_SHARE = "fraction of the limit at which the operator is warned"
 _PERSISTENCE = "time for which the limit must be exceeded before it trips"
 
 
@@ -125,7 +125,7 @@ def ramp_refusal(limits: Limits, ramps: Ramps) -> InvalidInput | None:
     if steepest <= limits.drive_slew:
         return None
     slew = f"limits.drive_slew = {limits.drive_slew:g} V/s"
-    needs = f"a ramp from {limits.drive_voltage:g} V needs {steepest:.0f} V/s, but {slew}"
+    needs = f"a ramp from {limits.drive_voltage:g} V needs {steepest:.0f} V/s, but {slew}: lengthen the ramp"
     return InvalidInput("ramps.abort", shortest, needs)
 
 

@@ -46,7 +46,8 @@ _OF_TABLE = frozenset({"displacement", "velocity", "acceleration", "force", "cur
 class ChannelLimit:
     """Limit on the magnitude of a further channel's signal, in `column` of the signals, relative to its zero at rest.
 
-    `warning` is the share of the limit at which the operator is warned, `debounce` the time before it trips [s].
+    `warning` is the fraction of the limit at which the operator is warned, `debounce` the time for which the limit must
+    be exceeded before it trips [s].
     """
 
     name: str

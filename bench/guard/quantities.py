@@ -101,8 +101,8 @@ class WatchedQuantities:
         return found
 
     def displayed(self, values: Array, magnitudes: Mapping[str, float]) -> dict[str, float]:
-        """Magnitudes of a block for display, with the current itself instead of its bound, the heating at its last
-        update, at most `MOST_SKIPPED` samples ago, and the position of each laser instead of the larger of the two.
+        """Magnitudes of a block for display: the current itself instead of its bound, the heating at its last update,
+        at most `MOST_SKIPPED` samples ago, and the position of each laser within its range instead of the largest one.
         """
         found = {key: value for key, value in magnitudes.items() if key != "laser_range"}
         if "current" in found and (current := self._load(values)[1]) is not None:
@@ -114,7 +114,7 @@ class WatchedQuantities:
         return found
 
     def skip(self, values: Array, bounds: dict[str, float]) -> None:
-        """Skip a block that has no missing samples; `bounds` are its bounds."""
+        """Skip a block without missing samples; `bounds` are those that the method `bounds` returned for this block."""
         self._tail = self._long[-self._span :]
         if "current" in bounds:
             self._skipped.append(values)
@@ -182,7 +182,7 @@ class WatchedQuantities:
 
 
 def filled(x: Array) -> Array:
-    """`x` with missing samples replaced by the last valid one."""
+    """`x`, shape (n,), with missing samples replaced by the last valid one before them, or by 0 if there is none."""
     missing = np.isnan(x)
     if not missing.any():
         return x

@@ -70,9 +70,7 @@ class SensorWatch:
         return found
 
     def _stuck(self, first: int, counts: Counts) -> list[Violation]:
-        """Violations for channels whose count was constant over the last `needed` samples while the table was
-        driven.
-        """
+        """Violations for channels with a constant count over the last `_needed` samples while the table was driven."""
         n = len(counts)
         same = (counts == counts[0]).all(axis=0) & (counts[0] == self._last)
         self._still = np.where(same, self._still + n, 0)
@@ -86,14 +84,14 @@ class SensorWatch:
         ]
 
     def _keep(self, drive: NDArray[np.float64]) -> None:
-        """Keep the drive blocks that contain the last `needed` samples."""
+        """Keep the drive blocks that contain the last `_needed` samples."""
         self._drives.append(drive)
         self._driven_samples += drive.size
         while self._driven_samples - self._drives[0].size >= self._needed:
             self._driven_samples -= self._drives.popleft().size
 
     def _driven(self) -> bool:
-        """Whether the drive changed by more than `_DRIVEN` in both halves of the last `needed` samples.
+        """Whether the drive changed by more than `_DRIVEN` in both halves of the last `_needed` samples.
 
         Near its peaks, a slow drive hardly changes within a single block.
         """
@@ -108,7 +106,9 @@ class SensorWatch:
 _SETTLED = 20.0
 """Time before two clocks are compared [s], long compared with the delay of a block."""
 _STRETCH = 5.0
-"""Length [s] of the windows at the start of a run and at present; the least delayed blocks of the two are compared."""
+"""Length [s] of the windows at the start of a run and at its current end; the least delayed blocks of the two are
+compared.
+"""
 
 
 class TimeWatch:

@@ -36,10 +36,10 @@ class LongTerm:
     point.
 
     If the orbit on the table is `stable`, the motion is the orbit. The motion repeats after `repeats` cycles; 0 if it
-    does not repeat, or if the block falls. `gains`, shape (n,), are the gains of the peaks of the last cycles; it is
-    empty if the block falls, which happens after `fallen` cycles. `low` and `high` enclose the greatest peaks of 95 %
-    of the drawn specimens whose block does not fall, and `falls` is the fraction of specimens whose block falls; all
-    three are NaN without drawn specimens.
+    does not repeat, or if the block falls. `gains`, shape (n,), are the gains of the peaks of the last cycles; the
+    array is empty if the block falls, which happens after `fallen` cycles. `low` and `high` enclose the gains of the
+    greatest peaks for 95 % of the drawn specimens whose block does not fall, and `falls` is the fraction of specimens
+    whose block falls; all three are NaN without drawn specimens.
     """
 
     omega: float
@@ -54,7 +54,7 @@ class LongTerm:
     falls: float = nan
 
     def gain(self, of: Callable[[NDArray[np.float64]], np.float64]) -> float:
-        """Value of the function `of`, such as a mean, for the gains; NaN if the block falls."""
+        """Result of the function `of`, such as `np.mean`, for the gains; NaN if the block falls."""
         return float(of(self.gains)) if self.gains.size else nan
 
 
@@ -130,10 +130,10 @@ def attractors_table(found: Sequence[LongTerm]) -> Table:
         "alpha_2_mean": numbers([each.gain(np.mean) for each in found], "1", "mean gain of the cycle peaks"),
         "alpha_2_greatest": numbers([each.gain(np.max) for each in found], "1", "gain of the greatest cycle peak"),
         "greatest_low": numbers(
-            [each.low for each in found], "1", "lower end of the range of the greatest peak for 95 % of the specimens"
+            [each.low for each in found], "1", "lower end of the 95 % range of alpha_2_greatest over the specimens"
         ),
         "greatest_high": numbers(
-            [each.high for each in found], "1", "upper end of the range of the greatest peak for 95 % of the specimens"
+            [each.high for each in found], "1", "upper end of the 95 % range of alpha_2_greatest over the specimens"
         ),
         "falls": numbers([each.falls for each in found], "1", "fraction of the drawn specimens whose block falls"),
     }

@@ -50,7 +50,7 @@ def bands(
 ) -> Bands:
     """Band around each `alpha_2`, shape (n,), of the motions `orbits`.
 
-    With `members` > 0, the band is from a Monte Carlo simulation with that number of draws. Otherwise it is to first
+    With `members` > 0, the band is from a Monte Carlo simulation with that number of draws. Otherwise it is of first
     order: the gain is computed at one standard uncertainty on both sides along each independent direction (GUM 5.1.4,
     note 2), and the band is symmetric. Where the motion exists on only one side, the result of that side is used for
     both.
@@ -60,7 +60,7 @@ def bands(
     for orbit in orbits:
         if orbit.specimen not in of:
             of[orbit.specimen] = _members(orbit.specimen, known, members)
-    # pad with the specimen itself: with a quantity that is exact for one spring only, the numbers of members differ
+    # pad with the specimen itself: if a quantity is exact for only some of the springs, the numbers of members differ
     most = max(map(len, of.values()), default=0)
     own = [of[orbit.specimen] + [orbit.specimen] * (most - len(of[orbit.specimen])) for orbit in orbits]
     gains = steady_gains(orbits, own, done=done, scheduler=scheduler)[:, :, 1]

@@ -25,7 +25,7 @@ FINE = 1e-15
 
 @dataclass(frozen=True)
 class Condition:
-    """Dependence and accuracy of one motion.
+    """Condition and accuracy of one motion.
 
     `number` is the greatest change of any state until the end, relative to the greatest magnitude of that state, per
     relative change of an input: amplitude, k1, k_C or coefficient of restitution. `error` is the greatest difference
@@ -67,7 +67,9 @@ def condition(coupled: Specimen, dwell: Sweep, times: ArrayLike, motion: Motion)
 
 
 def _changed(coupled: Specimen) -> Iterator[Specimen]:
-    """The specimen with each input changed by CHANGE; r decreases, because it cannot exceed 1."""
+    """Yields the specimen with one input at a time changed by CHANGE; the restitution factor is reduced, as it cannot
+    exceed 1.
+    """
     larger, smaller = 1.0 + CHANGE, 1.0 - CHANGE
     block, frame = coupled.block, coupled.frame
     lower = block.model_copy(update={"restitution_factor": smaller * block.restitution_factor})

@@ -43,7 +43,7 @@ def plain(values: NDArray[Any]) -> list[Any]:
 
 
 def write_csv(path: Path, table: Table) -> None:
-    """Write a table as CSV: one line of names that end in the unit, full precision, empty cells for absent values.
+    """Write a table as CSV: a line of column names, full precision, empty cells for absent values.
 
     Raises InvalidInput if `path` exists, RockbenchError when the disk fails.
     """
@@ -53,7 +53,7 @@ def write_csv(path: Path, table: Table) -> None:
         with unfinished.open("w", encoding="utf-8", newline="") as file:
             writer = csv.writer(file, lineterminator="\n")
             writer.writerow(table)
-            # in blocks: cells of text need far more memory than the numbers
+            # in blocks, because text cells need far more memory than numbers
             for first in range(0, rows, BLOCK):
                 block = (plain(column.values[first : first + BLOCK]) for column in table.values())
                 writer.writerows(zip(*([csv_cell(_text(value)) for value in each] for each in block), strict=True))

@@ -1,4 +1,4 @@
-"""Gain map: all steady motions over frequency and stiffness, as in Fig. 4 of the paper."""
+"""Gain map: all steady motions on a grid of frequencies and stiffnesses, as in Fig. 4 of the paper."""
 
 from collections.abc import Callable, Mapping
 from typing import Any, Literal
@@ -70,7 +70,7 @@ class _Steps:
         """Completed rows of the map."""
 
     def done(self, step: int, phase: str) -> Done:
-        """Function that counts the completed parts of `step` of the present block."""
+        """Function that reports the completed parts of `step` of the current block."""
         if self._total <= self._size:
             return counting(self._progress, phase)
         name = "computing the gain map"

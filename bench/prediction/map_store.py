@@ -1,7 +1,8 @@
-"""Rows of a large map, kept in a folder until the map is complete, so that it continues after a crash.
+"""Rows of a large map, kept in a folder until the map is complete, so that its computation can continue after a crash.
 
-Every column is a file to which blocks of rows are appended. A state file, replaced after each block, has the number of
-rows of these files and the state from which the map continues. Longer files are from an interrupted block and are cut.
+Each column is a file to which blocks of rows are appended. A state file, replaced after each block, contains the number
+of rows of these files and the state from which the map continues. Longer files are left from an interrupted block;
+their excess is overwritten or truncated by the next one.
 """
 
 import gc
@@ -24,8 +25,8 @@ from sim.map_rows import Continuation
 from sim.process_lock import LockHeld, ProcessLock
 
 STATE, OWN = "state.npz", "unfinished-map"
-"""Names of the state file, and of the file that marks the folder as one that may be removed; the lock
-of the process that writes to the folder is next to the latter.
+"""Names of the state file, and of the file that marks the folder as one that may be removed; the lock of the process
+that writes to the folder is stored next to the latter.
 """
 
 TEXT = "<U16"
@@ -125,7 +126,7 @@ class MapStore:
 
 
 def discard(folder: Path) -> None:
-    """Remove the folder of an unfinished map that will not be continued; another folder, and one to which a process
+    """Remove the folder of an unfinished map that will not be continued; any other folder, and one to which a process
     writes, is kept.
     """
     if folder.is_dir():
@@ -135,7 +136,7 @@ def discard(folder: Path) -> None:
 
 def _locked(folder: Path) -> ProcessLock:
     if folder.exists() and not (folder / OWN).exists() and any(folder.iterdir()):
-        raise InvalidInput("folder", str(folder), "it does not contain an unfinished map; rename or remove it")
+        raise InvalidInput("folder", str(folder), "the folder does not contain an unfinished map; rename or remove it")
     folder.mkdir(exist_ok=True)
     (folder / OWN).touch()
     try:
@@ -148,7 +149,7 @@ def _locked(folder: Path) -> ProcessLock:
 
 
 def _clear(folder: Path) -> None:
-    """Remove all files but those of the lock."""
+    """Remove all files except the marker of the folder and the lock."""
     for path in folder.iterdir():
         if not path.name.startswith(OWN):
             path.unlink()

@@ -86,7 +86,7 @@ class SpectrumRequest(GainRequest):
 
 
 class MapRequest(GainRequest):
-    """Gain over frequency and stiffness."""
+    """Gain on a grid of frequencies and stiffnesses."""
 
     omega: tuple[Frequency, ...] = _frequencies(spaced("12", "21", 100), least=2)
     beta: tuple[Stiffness, ...] = _stiffnesses(spaced("0.1", "1.2", 100), least=2)
@@ -99,7 +99,7 @@ class MapRequest(GainRequest):
 
 
 class OnTableRequest(OrbitsRequest):
-    """Points at which steady motions are computed on a table that the block pushes."""
+    """Points at which steady motions are computed on a table that reacts to the force of the block."""
 
     table_mass: float | None = quantity(
         None,
@@ -115,14 +115,14 @@ class OnTableRequest(OrbitsRequest):
 
 
 class StabilityRequest(OnTableRequest):
-    """Stability of the rocking orbits, on fixed ground and on a table that the block pushes."""
+    """Stability of the rocking orbits, on fixed ground and on a table that reacts to the force of the block."""
 
     omega: tuple[Frequency, ...] = _frequencies(spaced("12", "16", 41), least=2)
     beta: tuple[Stiffness, ...] = _stiffnesses((0.64, 0.97))
 
 
 class AttractorRequest(OnTableRequest):
-    """Long-term motions where the rocking orbit is unstable, on a table that the block pushes."""
+    """Long-term motions where the rocking orbit is unstable, on a table that reacts to the force of the block."""
 
     omega: tuple[Frequency, ...] = _frequencies((12.5, 15.0))
     beta: tuple[Stiffness, ...] = _stiffnesses((0.64, 0.97))

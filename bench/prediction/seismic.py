@@ -98,7 +98,7 @@ def band_study(
     """
     band, betas = band_of(request.table_band, configuration), sorted(request.beta)
     if band is None:
-        raise InvalidInput("--table-band", "none", "the study varies the band's lower end: omit it, or give LOW:HIGH")
+        raise InvalidInput("--table-band", "none", "the study varies the band's lower end: omit this or give LOW:HIGH")
     if max(request.corner) >= band[1]:
         raise InvalidInput("--corner", max(request.corner), f"it must be below the band's upper end, {band[1]:g} Hz")
     bands = [(record, (corner, band[1])) for record in records for corner in sorted(request.corner)]
@@ -136,7 +136,7 @@ def _curve(
 
 
 DIGITS = 9
-"""Significant digits of peaks and gains: the relative error of a step is 1e-10, which impacts amplify."""
+"""Significant digits of peaks and gains: impacts amplify the relative error of an integration step, 1e-10."""
 
 Columns = Mapping[str, tuple[type, str, str]]
 
@@ -161,7 +161,7 @@ GAINS: Columns = {
     "toppled_time_s": (
         np.float64,
         "s",
-        "time of overturning since the start of the motion; absent if it did not overturn",
+        "time of overturning since the start of the motion; absent if the block did not overturn",
     ),
     "impacts": (np.int64, "1", "number of impacts of the block"),
     "u1_max_m": (np.float64, "m", "greatest |u1|; absent if the run ended early"),
@@ -187,7 +187,7 @@ MOTIONS: Columns = {
     "sha256": (np.str_, "", "hash of the file's bytes, or of the samples"),
     **BAND,
     "record_peak_m_s2": (np.float64, "m/s2", "greatest acceleration of the record"),
-    "factor": (np.float64, "1", "factor on all accelerations"),
+    "factor": (np.float64, "1", "factor by which all accelerations were scaled"),
     "peak_m_s2": (np.float64, "m/s2", "greatest acceleration of the motion"),
     "velocity_max_m_per_s": (np.float64, "m/s", "greatest velocity of the table"),
     "displacement_max_m": (np.float64, "m", "greatest displacement of the table"),

@@ -1,4 +1,4 @@
-"""Multipliers of the rocking orbits on fixed ground and on the table, and the boundaries of stability."""
+"""Floquet multipliers of the rocking orbits on fixed ground and on the table, and the boundaries of stability."""
 
 from collections.abc import Sequence
 from math import nan, pi
@@ -20,12 +20,12 @@ GROUNDS = {"fixed ground": "modulus", "table": "table_modulus"}
 """Name of the column of moduli for each ground."""
 
 BOUNDARY = 1e-4
-"""Largest error of the frequency of a boundary [rad/s]."""
+"""Maximum error of the frequency of a boundary [rad/s]."""
 
 UNKNOWN = complex(nan, nan)
 
 REAL = 0.02
-"""Largest distance of a multiplier's argument from 0 or pi [rad] at which it counts as real."""
+"""Maximum distance of a multiplier's argument from 0 or pi [rad] at which the multiplier counts as real."""
 
 
 def multipliers_table(

@@ -28,7 +28,8 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True)
 class Check:
-    """Check of one claim: the claim, the finding, and the numbers that underlie it, `values` (SI units, by name).
+    """Check of one claim: the claim, the finding, and the numbers behind it, `values`, by name (SI units, phases in
+    degrees).
 
     `expected` is False for a claim that the model is known not to satisfy.
     """
@@ -65,7 +66,7 @@ class Statement:
 Floats = NDArray[np.float64]
 
 LOW, HIGH, STEP = 12.5, 22.5, 0.05
-"""Frequency range of a section, and its step [rad/s]."""
+"""Frequency range of a section of the gain map at constant beta, and its step [rad/s]."""
 
 PAPER_HIGH = 20.0
 """Highest frequency of the paper's spectra [rad/s]."""
@@ -103,7 +104,9 @@ theta.
 
 
 def harmonic_statements(specimen: Specimen, amplitude: float) -> list[Statement]:
-    """Statements 1 to 7 under a sine of `amplitude` [m/s2]. Raises RockbenchError if there is no orbit."""
+    """Statements 1 to 7 under a sine of `amplitude` [m/s2]. Raises RockbenchError if one of `POINTS` has no rocking
+    orbit.
+    """
     omegas = np.linspace(LOW, HIGH, round((HIGH - LOW) / STEP) + 1)
     gains = {beta: _section(specimen, beta, omegas, amplitude) for beta in sorted({*BETAS, *RIDGE})}
     points = {name: _rocking(specimen, omega, amplitude) for name, omega in POINTS.items()}
@@ -119,7 +122,7 @@ def harmonic_statements(specimen: Specimen, amplitude: float) -> list[Statement]
 
 
 def lead_of_u1(branch: Branch) -> float:
-    """Phase [degrees] by which u1 leads theta, at the drive frequency and in the paper's positive directions."""
+    """Phase [degrees] by which u1 leads theta at the drive frequency, with the sign conventions of the paper."""
     table = branch.orbit.samples(720)
     wave = np.exp(-1j * table[:, 0])
     return float(np.degrees(np.angle((table[:, 1] @ wave) / (table[:, 3] @ wave))))
@@ -178,7 +181,7 @@ def _points(specimen: Specimen, amplitude: float, points: Mapping[str, Branch]) 
     above = np.flatnonzero(section > 1.0)
     boundary = float(omegas[above[0]]) if above.size else float("nan")
     near = Check(
-        f"C lies within {CLOSE:g} rad/s of the boundary α₂ = 1",
+        f"C is within {CLOSE:g} rad/s of the boundary α₂ = 1",
         f"α₂ is {c:.4f} at C (17.5 rad/s) and passes 1 at {boundary:.2f} rad/s",
         abs(boundary - POINTS["C"]) <= CLOSE,
         {"C": c, "boundary": boundary},
@@ -190,7 +193,7 @@ def _phases(points: Mapping[str, Branch]) -> Statement:
     """Check the phase between u1 and theta.
 
     u1 > 0 is a displacement towards the block, and theta > 0 a rotation of the block towards the frame: equal signs
-    are opposite motions.
+    mean opposite directions.
     """
     apart = {name: abs(lead_of_u1(branch)) for name, branch in points.items()}
     ratio = {name: branch.orbit.peaks.theta / branch.orbit.peaks.u1 for name, branch in points.items()}
@@ -247,7 +250,9 @@ def _ridge(omegas: Floats, gains: Mapping[float, Floats]) -> Statement:
     ridge = {beta: float(omegas[np.nanargmax(gains[beta])]) for beta in RIDGE}
     holds = bool((np.diff(list(ridge.values())) > 0.0).all())
     values = {f"ridge at {beta:g}": place for beta, place in ridge.items()}
-    check = Check("the frequency of the largest α₂ grows with β", _listed(ridge, "{:.2f}") + " rad/s", holds, values)
+    check = Check(
+        "the frequency of the largest α₂ increases with β", _listed(ridge, "{:.2f}") + " rad/s", holds, values
+    )
     return Statement(7, "Ridge of the gain map", [check])
 
 

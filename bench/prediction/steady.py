@@ -94,7 +94,7 @@ def _timed(specimen: Specimen, solver: str, tolerance: float | None, prediction:
 def modes_table(specimen: Specimen, betas: Sequence[float]) -> Table:
     """Table with one row per mode: the bare frame first (beta NaN), then the coupled system at each stiffness.
 
-    Source: Eq. (12) to (14). A divergent mode has a growth rate instead of a frequency.
+    Source: Eq. (12) to (14) of the paper. A divergent mode has a growth rate instead of a frequency.
     """
     rows = list(_mode_rows(float("nan"), bare_modes(specimen.frame)))
     for beta in betas:
@@ -133,8 +133,8 @@ def _mode_rows(beta: float, modes: Modes) -> Iterator[tuple[float, float, float,
 DIGITS = 11
 """Significant digits of peaks and gains.
 
-In a comparison with orbits of order 26 that are periodic to 5e-14, the peaks at 228 points of a map have a median error
-of 1e-12 and a largest error of 3e-11.
+Compared with orbits computed at order 26, which are periodic to 5e-14, the peaks at 228 points of a map have a median
+error of 1e-12 and a maximum error of 3e-11.
 """
 
 MULTIPLIER_DIGITS = 9
@@ -170,7 +170,7 @@ EXTRA: dict[str, tuple[str, str, int | None]] = {
     "alpha_2_low": ("1", "lower bound of the 95 % band of alpha_2", 6),
     "alpha_2_high": ("1", "upper bound of the 95 % band of alpha_2", 6),
     "members_share": ("1", "fraction of the drawn specimens that have this motion; 1 for a first-order band", 6),
-    "status": ("", "exact, or how the simulation by another solver ended", None),
+    "status": ("", "exact, or final status of the simulation by another solver", None),
     "outcome": ("", "outcome of the sine switched on at rest: rocking, resting, other, toppled or failed", None),
     "outcome_time_s": ("s", "time at which the block overturned or the outcome was decided", None),
 }

@@ -1,4 +1,4 @@
-"""Fit of a record to the stroke of a bench by one or both methods, and its effect on the spectrum."""
+"""Fit of a record to the stroke of a bench by one or both methods, and its effect on the response spectrum."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

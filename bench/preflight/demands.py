@@ -62,7 +62,7 @@ class SimulatedTable:
 
 @dataclass(frozen=True)
 class IdentifiedTable:
-    """Response of an identified table; includes the specimen and friction at the time of identification."""
+    """Response of an identified table, with the effects of the specimen and friction at the time of identification."""
 
     model: TableModel
 
@@ -156,8 +156,8 @@ def load(
 
 
 def _heating(current: Array, held: float, time: float) -> float:
-    """Largest rms current, the root of the exponentially weighted mean of current^2 / 2, with the last amplitude held
-    for `held` [s].
+    """Largest rms current [A], the root of the exponentially weighted mean of current^2 / 2, with the last amplitude
+    held for `held` [s].
     """
     power = 0.5 * current**2
     mean, _ = exponential_mean(power, float(np.exp(-STEP / time)))
@@ -174,8 +174,8 @@ TOLERANCE = 1e-7
 
 @dataclass(frozen=True)
 class Travel:
-    """Largest magnitudes of the displacement at each laser and of the drift [m]. `toppled` is the time [s] at which the
-    block toppled; None if it did not topple, or if toppling was not evaluated.
+    """Largest magnitudes of the displacement measured by each laser and of the drift [m]. `toppled` is the time [s] at
+    which the block toppled; None if it did not topple, or if toppling was not evaluated.
     """
 
     storey_1: float
@@ -205,8 +205,8 @@ def stage_travels(
     """Travels of each specimen under its programme, which starts from rest; evaluated from `begin` [s] until the end of
     the programme or the fall of the block.
 
-    The programmes differ only in their amplitudes. `reference` is the mounting of the lasers. From `catch_angle` [rad]
-    on, the block counts as fallen.
+    The programmes differ only in their amplitudes. `reference` states whether the lasers are mounted on the ground or
+    the table. From `catch_angle` [rad] on, the block counts as fallen.
     """
     highest = max(max(sweep.omega) for sweep in programs[0].sweeps)
     times = np.arange(begin, programs[0].duration, tau / highest / PER_CYCLE)
@@ -248,7 +248,7 @@ UNPROBED = {
 
 
 def demands_of(known: Mapping[str, float], where: str, configuration: BenchConfiguration) -> tuple[Demand, ...]:
-    """Demands on all limited quantities in the decisive part `where` of a run that itself probes its table."""
+    """Demands on all limited quantities of a run that itself probes its table; `where` names the decisive part."""
     return tuple(
         Demand(quantity, known[quantity], None, where)
         if quantity in known

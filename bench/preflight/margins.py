@@ -18,9 +18,9 @@ from sim.errors import InvalidInput
 class Demand:
     """Largest predicted value of one limited quantity, a key of `bounds`, in its SI unit.
 
-    `value` is for the nominal specimen. Given the uncertainty of the specimen, 95 % of the specimens stay below
-    `likely`. `where` is the part of the run in which the value occurs. If it is not predicted, both values are None and
-    `where` is the reason.
+    `value` is for the nominal specimen. `likely` is the value that 95 % of the specimens do not exceed, given the
+    uncertainty of the specimen. `where` is the part of the run in which the value occurs. If it is not predicted, both
+    values are None and `where` is the reason.
     """
 
     quantity: str
@@ -136,7 +136,7 @@ class Margin:
 
     @property
     def likely(self) -> float | None:
-        """Margin that 95 % of the specimens keep, given the uncertainty; None if the demand is not predicted."""
+        """Margin that 95 % of the specimens reach or exceed, given the uncertainty; None if it is not predicted."""
         return None if self.demand.likely is None else 1.0 - self.demand.likely / self.bound.limit
 
     @property

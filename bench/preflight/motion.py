@@ -25,7 +25,7 @@ def table_demands(
 
 
 def laser_demands(storey_1: Motion, storey_2: Motion, drift: Motion, halves: tuple[float, float]) -> dict[str, Motion]:
-    """Measured displacements of the storeys, relative to half the ranges of their lasers, and the drift [m]."""
+    """Displacements that the lasers of the storeys measure, relative to half their ranges, and the drift [m]."""
     return {STOREYS[0]: storey_1 / halves[0], STOREYS[1]: storey_2 / halves[1], "drift": drift}
 
 
@@ -73,8 +73,8 @@ def resting_demands(
     made = {name: np.fft.irfft(spectrum, size)[: acceleration.size] for name, spectrum in series.items()}
     found = peaks(made)
     if "current" in made:
-        # the guard's exponential mean, and the rms over the record, which exceeds it in a record that is short for the
-        # time constant and may follow others
+        # the larger of the guard's exponential mean and the mean over the record: the latter exceeds the former if the
+        # record is short compared with the time constant, and other records may precede this one
         squares = made["current"] ** 2
         forget = float(np.exp(-1.0 / (configuration.limits.heating_time * sample_rate)))
         greatest = max(float(exponential_mean(squares, forget)[0].max()), float(np.mean(squares)))
@@ -83,7 +83,7 @@ def resting_demands(
 
 
 def _storeys(specimen: Specimen, omega: Array) -> NDArray[np.complex128]:
-    """u1 and u2 [m] per table acceleration [m/s2] at `omega` [rad/s], shape (2, n); with a block, they apply while it
+    """u1 and u2 [m] per table acceleration [m/s2] at `omega` [rad/s], shape (2, n); with a block, valid while the block
     rests.
     """
     mass, damping, stiffness = frame_matrices(specimen.frame)

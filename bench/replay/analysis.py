@@ -85,7 +85,7 @@ def _watched(plan: Plan, follower: Follower) -> Generator[Step, Outcome, object]
 class Analysis:
     """Re-analysed `points` of type `point_type`, and the inputs of their computation.
 
-    `settings` are the changed settings by name; `used` and `configuration` contain all settings in force.
+    `settings` are the changed settings by name; `used` and `configuration` contain all settings that were used.
     """
 
     points: Sequence[Parameters]
@@ -112,7 +112,9 @@ def write_analysis(original: Path, record: DataFile, analysis: Analysis, out: Pa
                 "--out", str(path), "the file exists and is never overwritten: give another name"
             ) from None
         except OSError as error:
-            raise InvalidInput("--out", str(path), f"the file cannot be created ({reason(error)})") from error
+            raise InvalidInput(
+                "--out", str(path), f"the file cannot be created ({reason(error)}): choose another folder"
+            ) from error
         try:
             with unfinished(path):
                 try:
@@ -143,7 +145,7 @@ def _fill(file: hdf5.File, original: Path, digest: str, record: DataFile, analys
     hdf5.write_text(process, "date", now(), description="time of the analysis by the wall clock, ISO 8601")
     texts = {
         "settings": (json.dumps(dict(analysis.settings), default=str), "changed settings, by name (JSON)"),
-        "used": (analysis.used.model_dump_json(), "every setting of the analysis that was in force (JSON)"),
+        "used": (analysis.used.model_dump_json(), "all settings of the analysis (JSON)"),
         "configuration": (analysis.configuration.model_dump_json(), "configuration of the bench, as used (JSON)"),
         "software": (json.dumps(software()), "versions of the software on which the numbers depend (JSON)"),
     }

@@ -32,7 +32,7 @@ DRIVE_ROUNDING = 1e-6
 ROWS_AT_ONCE = 2**16
 
 OF_INTERVALS = ("uncertainty", "dominating", "agrees", "alpha_1_low", "alpha_1_high", "alpha_2_low", "alpha_2_high")
-"""Words in the names of the columns that depend on the evaluation of uncertainties."""
+"""Parts of the names of columns that depend on the evaluation of uncertainties."""
 
 DRIVE, JOURNAL, POINTS, ENDING = "drive samples", "journal entries", "points", "ending"
 """Parts of a recording that are compared in addition to its other tables."""
@@ -93,9 +93,10 @@ class Comparison:
         return self._drive.played
 
     def finish(self, broken_off: str | None) -> Found:
-        """Compare the replay with the recording.
+        """Compare the replay with the recording and return the findings.
 
-        If the recording is `broken_off`, the journals are compared up to the replay's entry with this text.
+        For an incomplete recording, `broken_off` is a part of the text of the replay's journal entry before which the
+        comparison of the journals ends.
         """
         found = Found()
         self._drive.report(found)
@@ -110,8 +111,8 @@ class Comparison:
                 continue
             common = max(len(stored), len(rows))
             if broken_off is not None and path in (TwinEstimate.table, SensorsAligned.table):
-                # a killed program may lose its last samples but not the twin's estimates from them, and it has not
-                # published the end of its run
+                # a killed program may lose its last samples but not the live model's estimates from them, and it has
+                # not published the end of its run
                 common = min(len(stored), len(rows))
             elif broken_off is not None and path in self._entries:
                 common = entries[self._entries[path]]
@@ -188,7 +189,7 @@ class _DriveComparison:
             said = f"{said}; later recorded samples are not the response to the replayed drive"
             found.differences.append(Difference(said, DRIVE))
         elif self._exact < self.played:
-            said = f"{self.played - self._exact} samples of the drive differ by at most {self._largest:.2g} V"
+            said = f"drive samples that differ: {self.played - self._exact}, by at most {self._largest:.2g} V"
             found.differences.append(Difference(said, DRIVE, rounding=True))
 
 
@@ -248,8 +249,8 @@ def _scales(rows: Sequence[Mapping[str, Any]]) -> dict[tuple[str, Any], float]:
 
 
 def _relative_difference(was: Any, now: Any, scale: float) -> float:
-    """Difference of two values relative to `scale` or the larger of them; infinite for unequal values that are not
-    numbers.
+    """Difference of two values relative to the largest of `scale` and their magnitudes; infinite for unequal values
+    that are not numbers.
     """
     was, now = (None if each is None or each != each else each for each in (was, now))
     if isinstance(now, str):

@@ -1,4 +1,4 @@
-"""The recorded course of a run: its journal with typed columns, requests to end it, open inputs, alignments."""
+"""Recorded course of a run: journal with typed columns, requests to end the run, open safety inputs, alignments."""
 
 from collections import deque
 from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -70,8 +70,8 @@ class RecordedCourse:
         entries = self._entries()
         members = record.columns_of(TwinEstimate).get("members", ())
         self.twin_in_time = len({*members}) <= 1 and not any(each.columns.get("realtime") for each in entries)
-        """Whether the live twin kept up with the samples. If it did not, the estimates of the replay differ, because a
-        replay waits for its twin.
+        """Whether the live model kept up with the samples. If it did not, the estimates of the replay differ, because a
+        replay waits for its live model.
         """
         self.in_place: tuple[str, ...] = ()
         self.journal = self._without_timing(entries)
@@ -85,7 +85,7 @@ class RecordedCourse:
                 self._opened[run] = int(ends[entry.blocks - 1]), entry.columns["subject"].split(", ")
 
     def rows_of(self, path: str) -> Sequence[Mapping[str, Any]] | None:
-        """Rows of the table at `path`, which is that of a reproducible event; None if the file has no such table."""
+        """Rows of the table at `path`, whose event a replay reproduces; None if the file has no such table."""
         for kind, table in ENTRY_TABLES.items():
             if table.path == path:
                 return self._rows.get(kind.__name__)

@@ -19,7 +19,7 @@ from drivers.rig import Channel, Counts
 from sim.errors import InvalidInput
 
 _AHEAD = 10.0
-"""Duration read in one access [s]: reading thousands of samples takes no longer than reading one."""
+"""Duration of the samples read in one access [s]: reading thousands of samples takes no longer than reading one."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ class RunRecording:
 class DataFileRecording:
     """Open file as a `drivers.replay.Recording`; the caller closes the file.
 
-    Raises InvalidInput for a file without the configuration of its bench, or one that this software cannot read.
+    Raises InvalidInput if the file has no configuration of its bench, or one that this software cannot read.
     """
 
     def __init__(self, record: DataFile) -> None:
@@ -142,7 +142,7 @@ def former_keys(record: DataFile) -> str:
 def _configuration(record: DataFile) -> BenchConfiguration:
     stored = record.metadata.get("configuration")
     if stored is None:
-        raise InvalidInput("record", record.title, "it has no bench configuration and cannot be replayed")
+        raise InvalidInput("record", record.title, "the file has no bench configuration and cannot be replayed")
     try:
         content = with_present_names(BenchConfiguration, json.loads(stored))
         configuration = BenchConfiguration.model_validate_json(json.dumps(content))
@@ -151,9 +151,9 @@ def _configuration(record: DataFile) -> BenchConfiguration:
         if first["loc"] == ("backend",):
             allowed = f"{first['msg']}; {record.title} was recorded with this backend"
             raise InvalidInput("backend", first["input"], allowed) from error
-        allowed = "its configuration was written by another version of this software: replay it with that version"
+        allowed = "the configuration was written by another version of this software: replay the file with that version"
         raise InvalidInput("record", record.title, allowed) from error
-    # files of versions without a twin have no table of its estimates
+    # files of versions without a live model have no table of its estimates
     if record.columns_of(TwinEstimate):
         return configuration
     return configuration.model_copy(update={"twin": Twin(enabled=False)})

@@ -21,12 +21,12 @@ from sim import waiting
 from sim.parameters import Parameters
 
 LONGEST_WAIT = 1.0
-"""Longest pause in a replay in real time [s]; longer ones, for operator actions, are shortened to it."""
+"""Maximum pause in a replay in real time [s]; longer pauses, as for operator actions, are shortened to it."""
 
 
 class PacedClock:
     """Clock that shows the recorded time and runs at `speed` times real time. No block is late, however slow the
-    computer.
+    computer is.
 
     With a real-time clock, blocks that were recorded in time could be late for the guard.
     """
@@ -41,7 +41,7 @@ class PacedClock:
         return self._now
 
     def wait_until(self, instant: float) -> None:
-        """Wait until bench time `instant` is due, and set the clock to it."""
+        """Wait until bench time `instant` [s] is due, and set the clock to this time."""
         ahead = instant - self._now
         if ahead <= 0.0:
             return
@@ -101,9 +101,9 @@ class Replayed:
 
     `ended` states where and why the recording broke off before the end of the plan: an error of the rig, or the end of
     a killed program, neither of which recorded data can reproduce. `in_place` lists violations that the samples do not
-    contain and that abort requests replace. `played` of `rows` samples were requested. `same_wording` is False for a
-    file with other message texts, and `same_intervals` for one with another evaluation of uncertainties; neither is
-    then compared. `returned` is the result of the plan, or None if the plan did not end by itself.
+    contain; the replay makes abort requests in their place. `played` of `rows` samples were requested. `same_wording`
+    is False for a file with other message texts, and `same_intervals` for one with another evaluation of uncertainties;
+    neither is then compared. `returned` is the result of the plan, or None if the plan did not end by itself.
     """
 
     status: str
@@ -190,9 +190,9 @@ def replay(
 
 
 def _early_end(record: DataFile, over: str | None) -> str | None:
-    """Text that states where and why the recording ends before its plan; None if the plan ended."""
+    """Text that states where and why the recording ends before the end of its plan; None if the plan ended."""
     if record.status == UNFINISHED:
-        return f"{over or 'it ends'}: the program that wrote it was killed, or is still writing"
+        return f"{over or 'the file ends'}: the program that wrote the file was killed, or is still writing"
     if over is None or record.status not in ("failed", "halted", "interrupted"):
         return None
     return f"{over}: the run ended there ({record.status}), {record.summary}"
