@@ -63,7 +63,7 @@ class Alignment:
     """
 
     sensor: str = column("", "name of the channel")
-    offset: float = column("s", "time in the run at second 0 of the sensor's clock, excluding the delay")
+    offset: float = column("s", "time in the run at which the sensor's clock reads 0, excluding the delay")
     rate: float = column("1", "seconds of the sample clock per second of the sensor's clock")
     residual: float = column("s", "root mean square residual of the clock readings")
     delay: float = column("s", "configured delay added to the times of the values")
@@ -71,7 +71,7 @@ class Alignment:
     lost: int = column("1", "number of missing values")
     late: int = column("1", "number of samples whose values had not arrived when their block was due", default=0)
     implausible: int = column(
-        "1", "number of values farther from their predecessors than the target can move", default=0
+        "1", "number of values that differ from the previous one by more than the target can move", default=0
     )
 
     mark_uncertainty: float = column(
@@ -89,8 +89,8 @@ class Alignment:
             if number
         )
         given = ", ".join((f"{self.values} values, {self.lost} lost", *counted))
-        marked = "" if isinf(self.mark_uncertainty) else f", pulses within {1e6 * self.mark_uncertainty:.0f} us"
-        return f"{self.sensor}: clock {rate:+.1f} ppm, readings within {residual:.0f} us{marked}, {given}"
+        marked = "" if isinf(self.mark_uncertainty) else f", pulses +-{1e6 * self.mark_uncertainty:.0f} us"
+        return f"{self.sensor}: clock {rate:+.1f} ppm, rms residual {residual:.0f} us{marked}, {given}"
 
 
 class OperatorTask(StrEnum):
@@ -106,16 +106,16 @@ class OperatorTask(StrEnum):
     """Spring and block are removed, and the storeys are clamped to the table, so that they move with it."""
     UNLOCK_FRAME = "unlock frame"
     HOLD_BLOCK = "hold block"
-    """As MOUNT_SPRING, but with the block clamped to the table, so that it cannot lift and the end of the spring is
-    fixed to the table.
+    """As MOUNT_SPRING, but with the block clamped to the table, so that the block cannot lift and its end of the spring
+    does not move relative to the table.
     """
     LOCK_TABLE = "lock table"
     """The table, with any specimen, is clamped to the ground at mid stroke; it must not be driven."""
     UNLOCK_TABLE = "unlock table"
     WATCH_BLOCK = "watch block"
-    """The block stands alone, without spring, and the laser of storey 2 points horizontally at its face on the frame's
-    side, at the height above the table given by the amount [m]: see `sim.block_face`. No spring can be mounted in this
-    state; without a block the laser has no target."""
+    """The block stands alone, without spring, and the laser of storey 2 points horizontally at the block's face on the
+    frame's side; the amount is the height of the beam above the table [m] (see `sim.block_face`). No spring can be
+    mounted in this state. If the block is then removed, the laser has no target."""
     WATCH_STOREYS = "watch storeys"
     """The laser of storey 2 is aimed at its storey again."""
     TILT_BLOCK = "tilt block"
