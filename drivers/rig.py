@@ -186,28 +186,28 @@ class Rig(Protocol):
         ...
 
     def read(self, n: int) -> Block:
-        """The next `n` samples of all inputs; waits for them.
+        """Wait for the next `n` samples of all inputs and return them.
 
-        Raises DriveUnderflow, InputOverflow, DeviceTimeout or ConnectionLost, and RigError if not armed; the rig is
-        then stopped.
+        Raises DriveUnderflow, InputOverflow, DeviceTimeout or ConnectionLost, after which the rig is stopped, and
+        RigError if the rig is not armed.
         """
         ...
 
     def stop(self) -> None:
-        """Stop the sample clock, with the output at zero. Allowed in every state, and repeatedly."""
+        """Set the output to zero and stop the sample clock. Allowed in every state, and repeatedly."""
         ...
 
     def halt(self) -> None:
         """Cut the enable line now, then set the output to zero. Allowed in every state, and repeatedly.
 
         The only method that may be called while another one runs: from another thread while `read` waits, and from a
-        signal handler during any call. It must therefore not wait for locks held by other calls. An interrupted call
-        raises RigError, `read` at the latest when its block is due.
+        signal handler during any call. It must therefore not wait for locks held by other calls. The interrupted call
+        raises RigError; `read` does so when its block is due, at the latest.
         """
         ...
 
     def close(self) -> None:
-        """Stop, and release every device; may be called repeatedly."""
+        """Stop the rig and release every device; may be called repeatedly."""
         ...
 
     def perform(self, work: OperatorTask, amount: float | None = None) -> None:

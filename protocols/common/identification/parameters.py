@@ -34,7 +34,7 @@ class IdentifyParameters(Parameters):
     corner: float = quantity(
         1.0,
         "Hz",
-        "frequency below which the motion has constant displacement and above which it has constant acceleration",
+        "frequency below which all lines have equal displacement amplitude, and above which equal acceleration amplitude",
         gt=0,
         le=50,
     )
