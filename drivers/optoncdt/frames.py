@@ -218,7 +218,7 @@ class Assembler:
 
 
 def _steps(values: NDArray[np.int64], before: int, turn: int) -> NDArray[np.int64]:
-    """Forward steps from `before` to the first value and between values, for counts that wrap at `turn`, a power of 2."""
+    """Forward steps from `before` to the first value and between values; the counts wrap at `turn`, a power of 2."""
     steps = np.empty_like(values)
     steps[0] = values[0] - before
     np.subtract(values[1:], values[:-1], out=steps[1:])

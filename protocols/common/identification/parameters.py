@@ -34,7 +34,7 @@ class IdentifyParameters(Parameters):
     corner: float = quantity(
         1.0,
         "Hz",
-        "frequency below which all lines have equal displacement amplitude, and above which equal acceleration amplitude",
+        "frequency below which the lines have equal displacement amplitudes, and above which equal accelerations",
         gt=0,
         le=50,
     )

@@ -177,7 +177,7 @@ def mounted_name(specimen: Specimen) -> str:
 
 
 def planned(parameters: IdentifyParameters, configuration: BenchConfiguration) -> Planned:
-    """Plan the motions at the allowed level.
+    """Plan the motions at the requested level, or at the highest level that the bench allows.
 
     The drive limits the level only if the table is known, because it is simulated or was identified before. Raises
     InvalidInput for a band that the bench cannot produce.
@@ -205,7 +205,7 @@ def _motion_demands(
 
 
 def _drive(lines: Grid, motion: Complex, specimen: Specimen, configuration: BenchConfiguration) -> dict[str, float]:
-    """Peaks of the drive and of its slew rate, if the response of the table is known over the entire band."""
+    """Peaks of the drive [V] and of its slew rate [V/s]; empty if the response of the table is unknown."""
     response = response_of(configuration)
     if response is None:
         return {}
