@@ -70,8 +70,10 @@ class SpecimenHandling:
         """The arrangement with the block, free to rock or clamped, and the spring labelled `stiffness` [N/m]."""
         label = _needed("stiffness", stiffness, "mounting a spring requires its stiffness in N/m")
         if now.watched is not None:
-            elsewhere = "laser 2 measures the block, not storey 2; carry out watch storeys first"
-            raise RigError(f"{work.value} is refused: {elsewhere}")
+            elsewhere = (
+                f"{work.value} is refused: laser 2 measures the block, not storey 2; carry out watch storeys first"
+            )
+            raise RigError(elsewhere)
         specimen = self._free(now).with_spring(self._spring_factor * label)
         return replace(self._standing(specimen, now), block_clamped=work is OperatorTask.HOLD_BLOCK)
 

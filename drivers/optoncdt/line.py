@@ -48,8 +48,7 @@ class Line:
         except (ConnectionLost, StopIteration) as error:
             self.close()
             self.release()
-            message = str(error) or f"{who}: the process that reads its port ended at once; try again"
-            raise DeviceNotFound(message) from error
+            raise DeviceNotFound(str(error) or f"{who}: the reading process ended at once; try again") from error
         except BaseException:
             self.close()
             self.release()
