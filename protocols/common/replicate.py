@@ -113,7 +113,7 @@ def replicate(
     The event from `progress` is published after each pass. A pass with missing samples of the table's sensors is
     repeated; after a second loss the best drive so far is returned. The rig must not be armed on entry, and is not
     armed on return. Raises InvalidInput if the model does not cover the target, or if the first drive exceeds a limit
-    and may not be scaled.
+    and scaling it is not allowed.
     """
     replication = Replication(target, model, limits, parameters)
     achieved: Array | None = None

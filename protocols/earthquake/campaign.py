@@ -239,7 +239,7 @@ def check_statement(points: Sequence[PointLike], band: tuple[float, float]) -> d
 def statement_text(checked: Mapping[str, Any]) -> str:
     """The verdicts as lines of text for the terminal."""
     low, high = checked["band_hz"]
-    lines = [f"Statement of the paper: {checked['statement']}. Records are limited to {low:g} to {high:g} Hz."]
+    lines = [f"Statement of the paper: {checked['statement']}. Band of the records: {low:g} to {high:g} Hz."]
     for name in _SOURCES:
         found = checked[name]
         best = f"best {_gain_text(found['best'])}, around 0.5: {found['around_half']}"

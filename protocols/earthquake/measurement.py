@@ -163,7 +163,8 @@ STEP = 0.01
 """Time step of a predicted history [s]."""
 
 AUDIBLE = 20.0
-"""Minimum running peak of the bare drift, in standard uncertainties of that peak, at which a ratio is published."""
+"""Running peak of the bare drift, in standard uncertainties of the final peak, above which a running gain is published.
+"""
 
 
 @dataclass(frozen=True, eq=False)

@@ -164,7 +164,7 @@ class EarthquakePlan:
         try:
             observed = observe(outcome.signals, shaking.target.rest, rate)
         except InvalidInput as lost:
-            yield Publish(Warned(f"{shaking.name}, bare frame, has no measurable peak: {lost}"))
+            yield Publish(Warned(f"{shaking.name} has no measurable peak with the bare frame: {lost}"))
             return f"the bare frame has no measurable peak: {lost}"
         self._histories.bare(shaking, outcome.signals, History.of(self._specimen.bare(), observed.base).drift)
         return BareTest(

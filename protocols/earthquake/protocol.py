@@ -53,7 +53,7 @@ class EarthquakeParameters(Parameters):
         le=3600,
     )
     passes: int = quantity(
-        5, "1", "maximum number of passes of the replication of a record, with the bare frame", ge=1, le=20
+        5, "1", "maximum number of replication passes for a record, with the bare frame", ge=1, le=20
     )
     tolerance: float = quantity(
         0.005,

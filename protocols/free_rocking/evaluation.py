@@ -86,9 +86,9 @@ def inconsistencies(combined: RockingPoint) -> list[str]:
         )
     if combined.birge is not None and combined.birge > SCATTERED:
         found.append(
-            f"the scatter of the tilts is {combined.birge:.1f} times that expected from their uncertainties, and "
-            "is included: the impacts differ. r_exp is taken from the amplitudes, which are less sensitive to "
-            "these differences"
+            f"the scatter of the tilts is {combined.birge:.1f} times that expected from their uncertainties, and is "
+            "included in the uncertainty: the impacts differ. r_exp is taken from the amplitudes, which are less "
+            "sensitive to these differences"
         )
     if combined.birge is None:
         found.append("a single tilt does not show the scatter of r between tilts: release the block several times")

@@ -124,7 +124,7 @@ def hold(
 
 
 def capture_and_measure(run: "Hold", beta: float, report: Report) -> Generator[Step, Outcome, Held | Fallen]:
-    """Capture the orbit from the present motion, correct the table, and measure the held motion.
+    """Capture the orbit from the present motion, correct the motion of the table, and measure the held motion.
 
     On return, the control of the last cycle is still in effect, unless the hold was released for the stated reason.
     """

@@ -45,7 +45,7 @@ class TableState:
 class Settled:
     """A measured dwell: its peak, its steadiness, and its settling `time` [s]. `amplitude_error` (relative) and
     `phase_error` [rad] are errors of the table, after `updates` corrections of its drive. `motion` describes an
-    unsteady motion; if this revolves about a periodic motion, `orbit` is the peak of its mean cycle. `table` is the
+    unsteady motion; if that revolves about a periodic motion, `orbit` is the peak of its mean cycle. `table` is the
     state of the table at the end of the dwell, None if unknown.
     """
 
