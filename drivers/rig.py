@@ -71,7 +71,7 @@ class Alignment:
     lost: int = column("1", "number of missing values")
     late: int = column("1", "number of samples whose values had not arrived when their block was due", default=0)
     implausible: int = column(
-        "1", "number of values that differ from the previous one by more than the target can move", default=0
+        "1", "number of values that differ from the last plausible one by more than the target can move", default=0
     )
 
     mark_uncertainty: float = column(
@@ -194,7 +194,7 @@ class Rig(Protocol):
         ...
 
     def stop(self) -> None:
-        """Set the output to zero and stop the sample clock. Allowed in every state, and repeatedly."""
+        """Stop the sample clock and leave the output at zero. Allowed in every state, and repeatedly."""
         ...
 
     def halt(self) -> None:

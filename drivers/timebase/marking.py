@@ -1,6 +1,6 @@
 """Alignment of a sensor's clock by pulses on the sample clock that switch the beam of the sensor off.
 
-Each rising edge is between the last measurement with the beam and the first one without it, which bounds the offset
+Each rising edge occurs between the last measurement with the beam and the first one without it, which bounds the offset
 between the clocks to one measuring cycle. The spacing of the edges is a whole number of cycles plus the golden-ratio
 fraction of a cycle, so that their phases are evenly distributed over the cycle: the bounds of 40 edges differ by a 30th
 of a cycle, 8 us at 4000 1/s (three-gap theorem).

@@ -33,7 +33,7 @@ class Line:
 
 
 _SLEW = 50e-6
-"""Largest slew rate of the clock relation [s/s]: if the target moves at 1 m/s, the error grows by 50 um/s."""
+"""Largest slew rate of the clock relation [s/s]: if the target moves at 1 m/s, its position error grows by 50 um/s."""
 _FIRST_SLEW = 500e-6
 """Largest slew rate in the first phase of a run [s/s], when the clock relation is only known to a fraction of a
 millisecond.

@@ -133,7 +133,7 @@ def _steps(parameters: CheckParameters, configuration: BenchConfiguration) -> Ge
     yield from _publish(input_lines(at_rest.channels))
     yield from _publish(alignment_lines(at_rest.alignments, configuration))
     if any(line.verdict is Verdict.FAILED for line in resting):
-        remedy = "the table was not moved: correct the failures at rest, then repeat the check"
+        remedy = "the table was not moved: correct the failures found at rest, then repeat the check"
         yield from _publish([untested("bench", "motion", remedy)])
     else:
         yield from _motion(parameters, configuration)

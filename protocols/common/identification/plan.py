@@ -162,7 +162,7 @@ def _answer(moved: Complex) -> tuple[float, float]:
 
     The response is the root sum of squares, over the lines, of the mean amplitudes of the periods; the noise is the
     root sum of squares of the standard errors of these means, estimated from the scatter between periods. If the table
-    does not respond, the two differ only randomly, the less the more lines there are.
+    does not respond, the two differ only randomly, and the difference decreases with the number of lines.
     """
     periods, mean = moved.shape[0], moved.mean(axis=0)
     noise = np.sum(np.abs(moved - mean) ** 2) / (periods * (periods - 1))
