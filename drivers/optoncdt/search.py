@@ -59,7 +59,7 @@ _QUIET = 0.05
 """Time without input after which the line counts as quiet [s]: adapters delay data by up to 16 ms."""
 _SILENCE = "OUTPUT NONE"
 _TRIES = 3
-"""Attempts per command: bytes sent before at wrong baud rates can corrupt the first command at the right one."""
+"""Attempts per command: bytes sent earlier at wrong baud rates can corrupt the first command at the right one."""
 _DRAINED = 1.0
 """Longest wait for a quiet line [s]."""
 
