@@ -30,8 +30,8 @@ class Layout:
 
 
 def additional_signals(rate: float, baud: int) -> tuple[str, ...]:
-    """The additional signals that a line at `baud` can carry at the measuring rate `rate` [1/s]: counter and time stamp, or the
-    counter alone.
+    """The additional signals that a line at `baud` can carry at the measuring rate `rate` [1/s]: counter and time
+    stamp, or the counter alone.
 
     Raises InvalidInput if the counter does not fit, since without it a lost value would go unnoticed.
     """
