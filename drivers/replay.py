@@ -21,7 +21,7 @@ class RecordedRun(Protocol):
         ...
 
     def counts(self, first: int, n: int) -> Counts:
-        """Counts at `n` samples from index `first` on, shape (n, n_channels); the samples must lie within one
+        """Counts at `n` samples from index `first` on, shape (n, n_channels); the samples must be in one gap-free
         section.
         """
         ...

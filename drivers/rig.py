@@ -103,7 +103,7 @@ class OperatorTask(StrEnum):
     REMOVE_BLOCK = "remove block"
     STAND_BLOCK_UP = "stand block up"
     LOCK_FRAME = "lock frame"
-    """Spring and block are removed, and the storeys are clamped to the table, so that they move with it."""
+    """Spring and block are removed, and the storeys are clamped to the table, so that the storeys move with it."""
     UNLOCK_FRAME = "unlock frame"
     HOLD_BLOCK = "hold block"
     """As MOUNT_SPRING, but with the block clamped to the table, so that the block cannot lift and its end of the spring
@@ -176,7 +176,7 @@ class Rig(Protocol):
         ...
 
     def arm(self) -> None:
-        """Close the enable line with the output at zero. Sample 0 is acquired at once, or with the first block read."""
+        """Close the enable line with the output at zero. Sample 0 is acquired now, or with the first block read."""
         ...
 
     def write(self, volts: NDArray[np.float64]) -> None:

@@ -118,7 +118,7 @@ class LoopCheck(Prepared[CheckParameters]):
 
 
 def _steps(parameters: CheckParameters, configuration: BenchConfiguration) -> Generator[Step, Outcome, None]:
-    """Steps of the check; each line is published as a point when it has been measured."""
+    """Steps of the check; each line is published as a point as soon as it has been measured."""
     bare = configuration.known_specimen.bare()
     yield OperatorAction(OperatorTask.LOCK_FRAME, bare, _CLAMP)
     yield Publish(StepStarted("acquire at rest"))
