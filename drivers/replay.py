@@ -13,7 +13,7 @@ from drivers.rig import Alignment, Block, Channel, Counts, OperatorTask
 
 
 class RecordedRun(Protocol):
-    """Recording of one run, from arming to its end."""
+    """Recorded samples of one run, from arming to the end of the run."""
 
     @property
     def stretches(self) -> Sequence[tuple[int, int]]:
@@ -21,7 +21,7 @@ class RecordedRun(Protocol):
         ...
 
     def counts(self, first: int, n: int) -> Counts:
-        """Counts at `n` samples from index `first` on, shape (n, n_channels); the samples must lie within one
+        """Counts at `n` samples from index `first` on, shape (n, n_channels); the samples must be in one gap-free
         section.
         """
         ...
@@ -47,7 +47,7 @@ class Recording(Protocol):
 
     @property
     def lead(self) -> int:
-        """Lead of the recorded rig in drive samples."""
+        """Number of drive samples that the recorded rig required to be queued beyond a block."""
         ...
 
     @property
@@ -62,10 +62,10 @@ class Recording(Protocol):
 
 
 class Course(Protocol):
-    """Data of the recorded runs other than their samples; runs are numbered from 0."""
+    """Block times, safety inputs and clock alignments of the recorded runs; runs are numbered from 0."""
 
     def in_hand(self, run: int, samples: int) -> float:
-        """Time since the start of the recording [s] at which the first `samples` samples of `run` had been read."""
+        """Time since the start of the recording [s] at which the first `samples` samples of `run` were available."""
         ...
 
     def opened(self, run: int, samples: int) -> Collection[str]:
@@ -80,10 +80,10 @@ class Course(Protocol):
 class ReplayRig(RigBase):
     """Rig that replays the next recorded run at each arming.
 
-    The drive is checked as in every rig but has no effect. A block ends early at a gap or the end of the recording;
+    The drive is checked as in every rig but has no effect. A block ends early at a gap or at the end of the recording;
     after a gap the next block begins at a later sample, and the samples of the gap consume no drive. `lead` defaults to
-    the recording's lead. An optional `course` determines when blocks arrive, on a `clock` that begins at 0 with the
-    recording, and when safety inputs open. The caller closes the recording after closing the rig.
+    the recording's lead. An optional `course` determines when blocks arrive, on a `clock` that starts at 0 with the
+    recording, when safety inputs open, and the clock alignments. The caller closes the recording after closing the rig.
     """
 
     def __init__(
@@ -123,7 +123,7 @@ class ReplayRig(RigBase):
         self.require_stopped("arm", REARM)
         runs = self._recording.runs
         if self._number + 1 >= len(runs):
-            self._overrun = f"all {len(runs)} recorded runs have been replayed"
+            self._overrun = f"no recorded run remains (recorded: {len(runs)})"
             raise RigError(f"arm is refused: {self._overrun}; reopen the recording")
         self._number += 1
         self._rest = list(runs[self._number].stretches)

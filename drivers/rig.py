@@ -63,7 +63,7 @@ class Alignment:
     """
 
     sensor: str = column("", "name of the channel")
-    offset: float = column("s", "time in the run at second 0 of the sensor's clock, excluding the delay")
+    offset: float = column("s", "time in the run at which the sensor's clock reads 0, excluding the delay")
     rate: float = column("1", "seconds of the sample clock per second of the sensor's clock")
     residual: float = column("s", "root mean square residual of the clock readings")
     delay: float = column("s", "configured delay added to the times of the values")
@@ -71,7 +71,7 @@ class Alignment:
     lost: int = column("1", "number of missing values")
     late: int = column("1", "number of samples whose values had not arrived when their block was due", default=0)
     implausible: int = column(
-        "1", "number of values farther from their predecessors than the target can move", default=0
+        "1", "number of values that differ from the last plausible one by more than the target can move", default=0
     )
 
     mark_uncertainty: float = column(
@@ -89,8 +89,8 @@ class Alignment:
             if number
         )
         given = ", ".join((f"{self.values} values, {self.lost} lost", *counted))
-        marked = "" if isinf(self.mark_uncertainty) else f", pulses within {1e6 * self.mark_uncertainty:.0f} us"
-        return f"{self.sensor}: clock {rate:+.1f} ppm, readings within {residual:.0f} us{marked}, {given}"
+        marked = "" if isinf(self.mark_uncertainty) else f", pulses +-{1e6 * self.mark_uncertainty:.0f} us"
+        return f"{self.sensor}: clock {rate:+.1f} ppm, rms residual {residual:.0f} us{marked}, {given}"
 
 
 class OperatorTask(StrEnum):
@@ -103,19 +103,19 @@ class OperatorTask(StrEnum):
     REMOVE_BLOCK = "remove block"
     STAND_BLOCK_UP = "stand block up"
     LOCK_FRAME = "lock frame"
-    """Spring and block are removed, and the storeys are clamped to the table, so that they move with it."""
+    """Spring and block are removed, and the storeys are clamped to the table, so that the storeys move with it."""
     UNLOCK_FRAME = "unlock frame"
     HOLD_BLOCK = "hold block"
-    """As MOUNT_SPRING, but with the block clamped to the table, so that it cannot lift and the end of the spring is
-    fixed to the table.
+    """As MOUNT_SPRING, but with the block clamped to the table, so that the block cannot lift and its end of the spring
+    does not move relative to the table.
     """
     LOCK_TABLE = "lock table"
     """The table, with any specimen, is clamped to the ground at mid stroke; it must not be driven."""
     UNLOCK_TABLE = "unlock table"
     WATCH_BLOCK = "watch block"
-    """The block stands alone, without spring, and the laser of storey 2 points horizontally at its face on the frame's
-    side, at the height above the table given by the amount [m]: see `sim.block_face`. No spring can be mounted in this
-    state; without a block the laser has no target."""
+    """The block stands alone, without spring, and the laser of storey 2 points horizontally at the block's face on the
+    frame's side; the amount is the height of the beam above the table [m] (see `sim.block_face`). No spring can be
+    mounted in this state. If the block is then removed, the laser has no target."""
     WATCH_STOREYS = "watch storeys"
     """The laser of storey 2 is aimed at its storey again."""
     TILT_BLOCK = "tilt block"
@@ -176,7 +176,7 @@ class Rig(Protocol):
         ...
 
     def arm(self) -> None:
-        """Close the enable line with the output at zero. Sample 0 is acquired at once, or with the first block read."""
+        """Close the enable line with the output at zero. Sample 0 is acquired now, or with the first block read."""
         ...
 
     def write(self, volts: NDArray[np.float64]) -> None:
@@ -186,28 +186,28 @@ class Rig(Protocol):
         ...
 
     def read(self, n: int) -> Block:
-        """The next `n` samples of all inputs; waits for them.
+        """Wait for the next `n` samples of all inputs and return them.
 
-        Raises DriveUnderflow, InputOverflow, DeviceTimeout or ConnectionLost, and RigError if not armed; the rig is
-        then stopped.
+        Raises DriveUnderflow, InputOverflow, DeviceTimeout or ConnectionLost, after which the rig is stopped, and
+        RigError if the rig is not armed.
         """
         ...
 
     def stop(self) -> None:
-        """Stop the sample clock, with the output at zero. Allowed in every state, and repeatedly."""
+        """Stop the sample clock and leave the output at zero. Allowed in every state, and repeatedly."""
         ...
 
     def halt(self) -> None:
         """Cut the enable line now, then set the output to zero. Allowed in every state, and repeatedly.
 
         The only method that may be called while another one runs: from another thread while `read` waits, and from a
-        signal handler during any call. It must therefore not wait for locks held by other calls. An interrupted call
-        raises RigError, `read` at the latest when its block is due.
+        signal handler during any call. It must therefore not wait for locks held by other calls. The interrupted call
+        raises RigError; `read` does so when its block is due, at the latest.
         """
         ...
 
     def close(self) -> None:
-        """Stop, and release every device; may be called repeatedly."""
+        """Stop the rig and release every device; may be called repeatedly."""
         ...
 
     def perform(self, work: OperatorTask, amount: float | None = None) -> None:

@@ -18,7 +18,7 @@ _STILL_VELOCITY = 2.0e-4
 _STILL_DISPLACEMENT = 2.0e-4
 """Displacement of the table from mid stroke [m] below which the table is considered at rest."""
 _LONGEST_WAIT = 300.0
-"""Longest wait for rest [s]; a block held by its catch counts as at rest."""
+"""Longest time to wait until the bench is at rest [s]; a toppled block held by its strap counts as at rest."""
 _WARM_UP = 0.5
 """Settling time of filters and lasers at rest before the sample clock starts [s]."""
 
@@ -27,9 +27,10 @@ class SimulatedRig(ComputedRig):
     """Rig with a simulated bench. With a `VirtualClock` it runs as fast as the machine allows; with a `WallClock` a
     block is returned at the time at which it would have been measured.
 
-    `lead` is the number of drive samples that must be queued beyond a block, 50 ms by default. Between two runs the
-    bench coasts at zero drive until it is at rest. A part held by hand is released a few seconds after sample 0; if the
-    run ends earlier, the part remains held. Every spring is `spring_factor` times as stiff as its label.
+    `lead` is the number of drive samples that must be queued beyond a block; the default corresponds to 50 ms. Between
+    two runs the bench coasts at zero drive until it is at rest. A part held by hand is released a few seconds after
+    sample 0; if the run ends earlier, the part remains held. Every spring is `spring_factor` times as stiff as its
+    label.
     """
 
     def __init__(
@@ -79,7 +80,7 @@ class SimulatedRig(ComputedRig):
 
     def _come_to_rest(self) -> None:
         """Coast at zero drive until the bench is at rest."""
-        # `halt` must not wait for rest, because it may interrupt a read
+        # not done by `halt`, which must not wait because it may interrupt a read
         self.bench.disarm()
         waited = 0.0
         while self._moved and waited < _LONGEST_WAIT:

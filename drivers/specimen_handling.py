@@ -16,8 +16,9 @@ _CLAMPED = 400.0
 class SpecimenHandling:
     """Operator actions on the original specimen, with springs `spring_factor` times as stiff as their labels.
 
-    Mounting a spring, removing the block, placing it for laser 2 and clamping the storeys first release any part held
-    by hand and the clamp of the block. Only their own tasks change the table's lock and the target of laser 2.
+    Mounting a spring, removing the block, placing it as the target of laser 2 and clamping the storeys first release
+    any part held by hand and the clamp of the block. The lock of the table and the target of laser 2 are changed only
+    by their own tasks.
     """
 
     def __init__(self, specimen: Specimen, spring_factor: float = 1.0) -> None:
@@ -25,7 +26,7 @@ class SpecimenHandling:
         self._spring_factor = spring_factor
 
     def after(self, work: OperatorTask, amount: float | None, now: Arrangement) -> Arrangement:
-        """The arrangement that results from `work` with `amount` on the arrangement `now`.
+        """The arrangement after `work` with `amount` has been carried out on the present arrangement `now`.
 
         Raises InvalidInput for an amount that is missing or out of range, RigError for an impossible task.
         """
@@ -55,7 +56,7 @@ class SpecimenHandling:
                 top = 2.0 * now.specimen.block.h_b
                 if not 0.0 < height < top:
                     raise InvalidInput(
-                        "height", height, f"the beam hits the block at heights above 0 and below {top:g} m"
+                        "height", height, f"the beam hits the block only at heights above 0 and below {top:g} m"
                     )
                 return replace(self._standing(self._free(now).with_spring(0.0), now), watched=height)
             case OperatorTask.WATCH_STOREYS:
@@ -69,7 +70,9 @@ class SpecimenHandling:
         """The arrangement with the block, free to rock or clamped, and the spring labelled `stiffness` [N/m]."""
         label = _needed("stiffness", stiffness, "mounting a spring requires its stiffness in N/m")
         if now.watched is not None:
-            elsewhere = f"{work.value} is refused: laser 2 measures the block, not storey 2; watch storeys first"
+            elsewhere = (
+                f"{work.value} is refused: laser 2 measures the block, not storey 2; carry out watch storeys first"
+            )
             raise RigError(elsewhere)
         specimen = self._free(now).with_spring(self._spring_factor * label)
         return replace(self._standing(specimen, now), block_clamped=work is OperatorTask.HOLD_BLOCK)
@@ -77,7 +80,7 @@ class SpecimenHandling:
     def _pull(self, amount: float | None, now: Arrangement) -> float:
         """Displacement at which storey 2 is held [m]."""
         if now.specimen.frame != self._frame:
-            raise RigError("pull frame is refused: the storeys are clamped to the table; unlock frame first")
+            raise RigError("pull frame is refused: the storeys are clamped to the table; carry out unlock frame first")
         pull = _needed("pull", amount, "pulling the frame requires the displacement of storey 2 in m")
         highest = now.specimen.frame.h2
         if not 0.0 < abs(pull) < highest:
@@ -85,12 +88,12 @@ class SpecimenHandling:
         return pull
 
     def _free(self, now: Arrangement) -> Specimen:
-        """The present specimen with free storeys, since every task on a clamped frame first unlocks it."""
+        """The present specimen with the storeys unclamped."""
         return now.specimen.model_copy(update={"frame": self._frame})
 
     @staticmethod
     def _standing(specimen: Specimen, now: Arrangement) -> Arrangement:
-        """The arrangement with another specimen, without restraints or block clamp."""
+        """The arrangement with another specimen, no part of which is held by hand, and with the block unclamped."""
         return replace(now.let_go(), specimen=specimen, block_clamped=False)
 
 
@@ -113,7 +116,7 @@ def _tilt(amount: float | None, now: Arrangement) -> float:
 
 
 def _needed(item: str, amount: float | None, why: str) -> float:
-    """The amount. Raises InvalidInput if it is missing or not finite."""
+    """`amount`. Raises InvalidInput for `item` if it is missing or not finite."""
     if amount is None or not isfinite(amount):
         raise InvalidInput(item, amount, why)
     return amount

@@ -1,4 +1,4 @@
-"""Assembly of measurements from words: layout, index and time of a measurement."""
+"""Assembly of a sensor's data words into measurements with index and time."""
 
 from dataclasses import dataclass
 
@@ -13,15 +13,15 @@ BITS_PER_VALUE = 30
 """Bits per value on the line: three bytes, each with a start and a stop bit."""
 
 _WISHES = (("COUNTER", "TIMESTAMP"), ("COUNTER",))
-"""Sets of additional signals, in order of preference."""
+"""Sets of additional output signals, in order of preference."""
 _VALUES = {"TIMESTAMP": ("TIMESTAMP_LO", "TIMESTAMP_HI")}
-"""Signals of several values: the time stamp occupies two values of 16 bits (manual, p. 66)."""
+"""Signals that are output as several values: the time stamp occupies two values of 16 bits (manual, p. 66)."""
 
 
 @dataclass(frozen=True)
 class Layout:
-    """Positions of the values in a measurement of `size` values; the distance is at 0. `time` holds the positions of
-    the lower and upper half of the time stamp.
+    """Positions of the values in a measurement of `size` values; the distance is at position 0. `time` holds the
+    positions of the lower and upper half of the time stamp; it is None if no time stamp is output.
     """
 
     size: int
@@ -30,7 +30,8 @@ class Layout:
 
 
 def additional_signals(rate: float, baud: int) -> tuple[str, ...]:
-    """The additional signals that fit on the line at `rate` [1/s]: counter and time stamp, or the counter alone.
+    """The additional signals that a line at `baud` can carry at the measuring rate `rate` [1/s]: counter and time
+    stamp, or the counter alone.
 
     Raises InvalidInput if the counter does not fit, since without it a lost value would go unnoticed.
     """
@@ -75,13 +76,13 @@ TICK = 10e-6
 """Resolution of the time stamp [s] (manual, p. 66)."""
 
 _LOCK = 8
-"""Number of consecutive measurements required before values are accepted."""
+"""Number of measurements that must each continue the previous one before values are accepted."""
 _FACTORY = 100
-"""Number of consecutive single-word measurements that show that the sensor sends distances alone."""
+"""Number of consecutive single-word measurements after which the sensor is assumed to send only distances."""
 _SLACK = 2.0
-"""Largest deviation of the time-stamp step from one period between consecutive measurements [periods]."""
+"""Largest accepted deviation of the time-stamp step between consecutive measurements from one period [periods]."""
 _RATE_SLACK = 0.01
-"""Largest relative difference between the steps of time stamp and counter over a longer gap."""
+"""Largest accepted relative difference between the steps of time stamp and counter over a longer gap."""
 
 
 @dataclass(frozen=True)
@@ -118,8 +119,8 @@ class Assembler:
     def feed(self, words: Words) -> Frames:
         """The measurements completed by `words`.
 
-        Raises ConnectionLost if the counter or the time stamp has jumped and continues from there, or if only distances
-        are received: the sensor was switched off in between.
+        Raises ConnectionLost if the counter or the time stamp jumps and continues from its new value, or if only
+        distances are received: the sensor has restarted, or was silent for too long.
         """
         code, counter, ticks = self._blocks(words)
         if not code.size:
@@ -132,8 +133,8 @@ class Assembler:
         return Frames(index, elapsed.astype(np.float64) * TICK, code)
 
     def _blocks(self, words: Words) -> tuple[NDArray[np.int32], NDArray[np.int64], NDArray[np.int64]]:
-        """Distance, counter and time stamp of the complete measurements; an incomplete one is kept until more words
-        arrive.
+        """Distance, counter and time stamp (0 if not output) of the complete measurements; an incomplete one is kept
+        until more words arrive.
         """
         code = np.concatenate((self._code, words.code))
         first = np.concatenate((self._first, words.first))
@@ -152,17 +153,17 @@ class Assembler:
         return code[start], counter, high << 16 | low
 
     def _require_no_factory_stream(self, size: NDArray[np.int64]) -> None:
-        """Raise ConnectionLost if the sensor sends distances alone, as it does with its factory settings."""
+        """Raise ConnectionLost if the sensor sends only distances, as it does with its factory settings."""
         whole = np.flatnonzero(size != 1)
         self._alone = size.size - 1 - int(whole[-1]) if whole.size else self._alone + size.size
         if self._layout.size > 1 and self._alone >= _FACTORY:
             raise ConnectionLost(
                 f"{self._who} sends distances without a counter: it has restarted with its factory settings; check its"
-                " power supply, and reopen it"
+                " power supply, and reopen the sensor"
             )
 
     def _trusted(self, counter: NDArray[np.int64], ticks: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Mask of the measurements that continue the previous one; initially only after `_LOCK` consecutive ones."""
+        """Mask of the measurements that continue the previous one; initially only after `_LOCK` of them in a row."""
         before = self._neighbour or (int(counter[0]), int(ticks[0]))
         follows = _steps(counter, before[0], COUNTER_TURN) == 1
         if self._layout.time is not None:
@@ -171,7 +172,7 @@ class Assembler:
         self._neighbour = int(counter[-1]), int(ticks[-1])
         if self.values:
             return follows
-        # length of the run of consecutive measurements up to each one
+        # number of measurements in a row, up to each one, that continue the previous one
         place = np.arange(counter.size)
         run = place - np.maximum.accumulate(np.where(follows, -1 - self._run, place))
         self._run = int(run[-1])
@@ -198,7 +199,7 @@ class Assembler:
 
     def _checked(self, steps: NDArray[np.int64], passed: NDArray[np.int64]) -> NDArray[np.int64]:
         """The steps of the index, with the wraps of the counter within gaps added; `passed` holds the ticks between
-        values.
+        measurements.
         """
         if self._layout.time is None:
             jump = steps > COUNTER_TURN // 2
@@ -206,18 +207,18 @@ class Assembler:
             expected = passed * (TICK * self._rate)
             turns = np.maximum(np.rint((expected - steps) / COUNTER_TURN), 0.0).astype(np.int64)
             steps = steps + turns * COUNTER_TURN
-            # in a gap so long that the clocks may differ by a period of the counter, the number of wraps is ambiguous
+            # over a long gap the clocks may differ by half a period of the counter: the number of wraps is ambiguous
             slack = 2.0 * _SLACK + _RATE_SLACK * expected
             jump = (np.abs(expected - steps) > slack) | (slack > COUNTER_TURN // 2)
         if jump.any():
             raise ConnectionLost(
-                f"{self._who} restarted its counter or was silent for too long; check its power, and reopen it"
+                f"{self._who} restarted its counter or was silent for too long; check its power, and reopen the sensor"
             )
         return steps
 
 
 def _steps(values: NDArray[np.int64], before: int, turn: int) -> NDArray[np.int64]:
-    """Forward steps from `before` to the first value and between values, for counts that wrap at a power of 2."""
+    """Forward steps from `before` to the first value and between values; the counts wrap at `turn`, a power of 2."""
     steps = np.empty_like(values)
     steps[0] = values[0] - before
     np.subtract(values[1:], values[:-1], out=steps[1:])

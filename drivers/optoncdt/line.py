@@ -1,11 +1,11 @@
 """Serial line of a streaming sensor, read by a separate process.
 
-A port buffers a few thousand bytes, a tenth of a second at full rate. The process time-stamps the bytes on arrival and
-keeps them while this program is stalled, so that a stall loses no values.
+A port buffers only a few thousand bytes, about a tenth of a second at the full rate. The process time-stamps the bytes
+on arrival and keeps them while this program is stalled, so that no values are lost.
 
-Frames from the process: time of arrival on the machine's clock [s] (float64), number of bytes (uint32), the bytes. A
-frame whose time is NaN contains the text of the error that ended the process; one without bytes reports that the port
-is open.
+The process writes frames: time of arrival on the machine's clock [s] (float64), number of bytes (uint32), the bytes. A
+frame whose time is NaN contains the text of the error that ended the process; an empty frame reports that the port is
+open.
 """
 
 import queue
@@ -29,14 +29,13 @@ _HEAD = struct.Struct("<dI")
 _PACE = 0.0025
 """Pause between two reads of the line [s]; the cost of a read does not depend on the number of bytes.
 
-The more frequent the reads, the closer some of them follow an arrival, which improves the estimate of the sensor's
-clock.
+With frequent reads, some follow an arrival closely, which improves the estimate of the sensor's clock.
 """
 
 
 class Line:
-    """The process that reads `port` at `baud`. This program must have closed the port. Methods may be called from any
-    thread.
+    """The process that reads `port` at `baud`; the port must not be open in this program. `who` identifies the sensor
+    in errors. Methods may be called from any thread.
 
     Raises DeviceNotFound if the port cannot be opened.
     """
@@ -49,7 +48,7 @@ class Line:
         except (ConnectionLost, StopIteration) as error:
             self.close()
             self.release()
-            raise DeviceNotFound(str(error) or f"{who}: the process that reads its port ended at once") from error
+            raise DeviceNotFound(str(error) or f"{who}: the reading process ended at once; try again") from error
         except BaseException:
             self.close()
             self.release()
@@ -60,7 +59,9 @@ class Line:
         self._child.write(sent)
 
     def chunks(self) -> Iterator[tuple[bytes, float]]:
-        """Received bytes and their arrival [s], until `close`. Raises ConnectionLost if the port has disappeared."""
+        """Received bytes and their arrival times on the machine's clock [s], until `close`. Raises ConnectionLost if
+        the port has disappeared.
+        """
         return self._frames()
 
     def close(self) -> None:
@@ -68,7 +69,7 @@ class Line:
         self._child.end()
 
     def release(self) -> None:
-        """Close the pipe from the process, after the last use of `chunks`."""
+        """Close the pipe from the process. To be called after the last use of `chunks`."""
         with suppress(OSError):
             self._child.output.close()
 
@@ -95,7 +96,7 @@ def _serve(who: str, name: str, baud: int, commands: IO[bytes], frames: IO[bytes
             threading.Thread(target=_forward, args=(commands, port, over), daemon=True).start()
             while not over.is_set():
                 time.sleep(_PACE)
-                # bytes already received may be old; the arrival time of the next byte is known
+                # bytes already buffered may be old, so the read waits for the next byte, whose arrival time is known
                 chunk = port.read(port.in_waiting) + port.read(1)
                 chunk += port.read(port.in_waiting)
                 if chunk:
@@ -103,7 +104,7 @@ def _serve(who: str, name: str, baud: int, commands: IO[bytes], frames: IO[bytes
     except DeviceNotFound as error:
         pending.put((str(error).encode(), nan))
     except Exception as error:
-        # the library raises various errors when a port disappears
+        # pyserial raises various errors when a port disappears
         message = f"{who} was disconnected ({error}); plug it in, check its power, and reopen it"
         pending.put((message.encode(), nan))
     finally:
@@ -121,7 +122,7 @@ def _write(pending: "queue.SimpleQueue[tuple[bytes, float] | None]", frames: IO[
 
 
 def _forward(commands: IO[bytes], port: Serial, over: threading.Event) -> None:
-    """Pass commands on to the port, until the program closes the pipe or ends."""
+    """Pass commands on to the port until the program that sends them closes the pipe or ends."""
     with suppress(OSError, ValueError):
         while command := commands.readline():
             port.write(command)

@@ -17,7 +17,7 @@ if sys.platform == "win32":
 else:
     import termios
 
-    # raised when the system refuses a setting; the library does not translate it
+    # raised when the system refuses a setting; pyserial does not convert it to a SerialException
     _PORT_ERRORS = (OSError, ValueError, termios.error)
 
 _READ_TIMEOUT = 0.02
@@ -27,17 +27,17 @@ _NETWORK_BUFFER = 1 << 16
 
 
 NETWORK = "socket://"
-"""Beginning of the address of a serial line on a network port."""
+"""Prefix of the address of a serial line on a network port."""
 
 
 class SocketPort(protocol_socket.Serial):
-    """A serial line on a network port that reports the number of received bytes; the library's class reports only
-    whether there are any, so that a stream would be read byte by byte.
+    """A serial line on a network port, whose `in_waiting` is the number of received bytes. The base class only reports
+    whether there are any, so a stream would be read byte by byte.
     """
 
     @property
     def in_waiting(self) -> int:
-        """Number of received bytes; 1 at the end of the connection, so that reading raises SerialException."""
+        """Number of received bytes; 1 once the connection has ended, so that the next read raises SerialException."""
         try:
             return len(cast(Any, self)._socket.recv(_NETWORK_BUFFER, socket.MSG_PEEK)) or 1
         except BlockingIOError:
@@ -79,7 +79,7 @@ def has_baud(port: Serial, baud: int) -> bool:
 
 
 def _set_low_latency(port: Serial) -> None:
-    """Set the adapter's low-latency mode if supported, and enlarge the receive buffer where the default is small."""
+    """On Linux, set the adapter's low-latency mode if supported; on Windows, enlarge the receive buffer."""
     if sys.platform == "win32":
         port.set_buffer_size(rx_size=_WINDOWS_BUFFER)
     elif sys.platform == "linux":
@@ -89,7 +89,7 @@ def _set_low_latency(port: Serial) -> None:
 
 def _reason(port: str, error: Exception) -> str:
     number = error.errno if isinstance(error, OSError) else None
-    # on Windows the library gives the system's error only as text, and a port in use is reported as not permitted
+    # on Windows pyserial reports the system's error only as text, and a port in use as PermissionError
     windows = isinstance(error, SerialException) and number is None
     if number in (errno.EBUSY, errno.EAGAIN) or (windows and "PermissionError" in str(error)):
         return f"{port} is in use; close the program that holds it"

@@ -1,4 +1,4 @@
-"""Sensors on the serial ports of this machine: identity, baud rate, and the search for both."""
+"""Search for sensors on the serial ports of this machine: identity and baud rate."""
 
 import re
 from collections.abc import Sequence
@@ -19,7 +19,7 @@ _IDENTITY = "GETINFO"
 
 @dataclass(frozen=True)
 class SensorInfo:
-    """The identity of a sensor; `measuring_range` in m."""
+    """The identity of a sensor; `measuring_range` [m]."""
 
     model: str
     serial: str
@@ -40,9 +40,9 @@ class SensorInfo:
 
 
 def info_in(lines: list[str]) -> SensorInfo | None:
-    """The identity in the lines that answer `GETINFO`; None unless they contain a sensor and its range.
+    """The identity in the sensor's reply to `GETINFO`; None unless `lines` contain a name and a measuring range.
 
-    Source: manual, p. 97: one `key: value` per line, the range with its unit.
+    Format (manual, p. 97): one `key: value` per line, the range with its unit.
     """
     pairs = (line.split(":", 1) for line in lines if ":" in line)
     given = {key.strip().lower(): value.strip() for key, value in pairs}
@@ -54,12 +54,12 @@ def info_in(lines: list[str]) -> SensorInfo | None:
 
 
 _PROBE = 0.3
-"""Time-out for an answer at one baud rate [s]."""
+"""Time-out of a command at one baud rate [s]."""
 _QUIET = 0.05
 """Time without input after which the line counts as quiet [s]: adapters delay data by up to 16 ms."""
 _SILENCE = "OUTPUT NONE"
 _TRIES = 3
-"""Number of attempts per command: bytes sent at other baud rates corrupt the first command at the right rate."""
+"""Attempts per command: bytes sent earlier at wrong baud rates can corrupt the first command at the right one."""
 _DRAINED = 1.0
 """Longest wait for a quiet line [s]."""
 
@@ -74,11 +74,11 @@ class Answer:
 
 
 def silenced(dialogue: Dialogue, item: str, baud: int | None) -> Answer:
-    """Switch the output of the sensor off, at `baud` or at the detected baud rate.
+    """Switch the output of the sensor off, at `baud`, or at the detected baud rate if `baud` is None.
 
     The first command may be lost in a running stream, so several attempts are made. Raises DeviceNotFound if nothing
     responds, InvalidInput for `item` if the sensor responds at a baud rate other than `baud`, CommandRefused if it
-    continues to stream.
+    rejects the command or continues to stream.
     """
     first, *others = BAUDS if baud is None else (baud, *(other for other in BAUDS if other != baud))
     answer = _answer(dialogue, first, _SILENCE, tries=3) or _search(dialogue, others, _SILENCE)
@@ -88,7 +88,7 @@ def silenced(dialogue: Dialogue, item: str, baud: int | None) -> Answer:
             "pairs are not swapped or reversed, and that the data output is not set to its web interface"
         )
     if baud is not None and answer.baud != baud:
-        allowed = f"{dialogue.who} responds at {answer.baud}: set this baud rate, or omit it"
+        allowed = f"{dialogue.who} responds at {answer.baud} baud: set this baud rate, or omit the key"
         raise InvalidInput(item, baud, allowed)
     if answer.refusal is not None:
         raise answer.refusal
@@ -96,7 +96,7 @@ def silenced(dialogue: Dialogue, item: str, baud: int | None) -> Answer:
 
 
 def detect_sensor(dialogue: Dialogue) -> Answer | None:
-    """Detect baud rate and sensor without changing the sensor's settings; None if nothing responds."""
+    """Detect the sensor and its baud rate without changing its settings; None if nothing responds."""
     return _search(dialogue, BAUDS, "GETUSERLEVEL")
 
 
@@ -130,7 +130,7 @@ def _refusal(dialogue: Dialogue, command: str) -> CommandRefused | None:
         except CommandRefused as error:
             refusal = error
             continue
-        # an error text inside a value would not be detected, so the effect of the command is checked
+        # an error message interleaved with values can be missed, so the effect of the command is checked
         if command != _SILENCE or dialogue.drain(_QUIET, _DRAINED):
             return None
         refusal = CommandRefused(dialogue.who, command, "values continue to arrive")
@@ -147,7 +147,9 @@ def _identity(dialogue: Dialogue) -> SensorInfo | None:
 
 @dataclass(frozen=True)
 class FoundLaser:
-    """One serial port: its sensor and baud rate, or the reason why no sensor can be used."""
+    """Search result of one serial port: the sensor and its baud rate if one responds, and the reason, if any, why it
+    cannot be used.
+    """
 
     port: str
     baud: int | None
@@ -156,10 +158,10 @@ class FoundLaser:
 
 
 def find_lasers(ports: Sequence[str] | None = None) -> list[FoundLaser]:
-    """The sensors on `ports`, by default on all ports that the system lists.
+    """One search result per port of `ports`, by default of all ports that the system lists.
 
-    Sends only queries, at each possible baud rate, so that the settings of a sensor do not change and a stream
-    continues. Takes about 4 s for any number of ports, which are searched in parallel.
+    Sends only queries, at each possible baud rate, so a sensor's settings do not change and a running stream continues.
+    The ports are searched in parallel, which takes about 4 s in total.
     """
     names = list(dict.fromkeys(listed_ports() if ports is None else ports))
     if not names:

@@ -15,7 +15,7 @@ from drivers.optoncdt.stream import Readings, Stream
 from sim.errors import InvalidInput
 
 _FIXED = ("AVERAGE NONE", "TRIGGER NONE", "OUTHOLD NONE", "OUTREDUCEDEVICE NONE")
-"""Settings that disable filter, trigger, hold of old values and output reduction."""
+"""Commands that disable filter, trigger, holding of old values and output reduction."""
 
 
 def require_sensor(
@@ -34,17 +34,17 @@ def require_sensor(
         raise InvalidInput(f"hardware.{name}.measuring_range", measuring_range, allowed)
     if serial_number is not None and serial_number != info.serial:
         allowed = (
-            f"{who} is the sensor {info.serial or 'without serial number'}: swap the ports, or correct this "
+            f"{who} is the sensor {info.serial or 'without a serial number'}: swap the ports, or correct this "
             "serial number"
         )
         raise InvalidInput(f"hardware.{name}.serial_number", serial_number, allowed)
 
 
 def configure(dialogue: Dialogue, rate: float, baud: int) -> tuple[Layout, bool]:
-    """Configure all settings for measurements at `rate` [1/s], with the output switched off. Returns the layout of a
-    measurement, and whether the sensor has confirmed its rate.
+    """Configure all settings for measurements at `rate` [1/s]; the output must be switched off. Returns the layout of
+    a measurement, and whether the sensor has confirmed its rate.
 
-    Raises InvalidInput for a rate that line or sensor does not support, RigError if the sensor rejects a setting.
+    Raises InvalidInput for a rate that `baud` or the sensor does not support, RigError if the sensor rejects a setting.
     """
     signals = additional_signals(rate, baud)
     dialogue.ask("ECHO OFF")
@@ -61,7 +61,7 @@ def configure(dialogue: Dialogue, rate: float, baud: int) -> tuple[Layout, bool]
 def _require_no_mastering(dialogue: Dialogue) -> None:
     """Raise RigError if mastering is on, since it shifts the zero without an indication in the stream (manual, p. 65).
 
-    The query is not documented. To a sensor that rejects it, MASTERMV NONE is sent, which is documented (p. 108).
+    The query is undocumented. If the sensor rejects it, the documented command MASTERMV NONE is sent (p. 108).
     """
     remedy = "set MASTERMV NONE in its web interface"
     try:
@@ -84,10 +84,10 @@ _RATES = "sensors support 250, 500, 1000, 2000 and 4000 1/s, newer ones also 800
 
 
 def _set_rate(dialogue: Dialogue, rate: float) -> bool:
-    """Set the rate, in kHz in the command, and read it back: if the sensor did not adopt the rate, this would go
-    unnoticed and make the time base wrong.
+    """Set the rate [1/s] and read it back, since a rate that the sensor has not adopted makes the time base wrong.
 
-    Returns False if the sensor lacks the query, which the manual does not document; the values must then be counted.
+    Returns False if the sensor does not support the query, which is undocumented; the rate must then be checked by
+    counting values.
     """
     item, known = _RATE, _RATES
     try:
@@ -102,7 +102,7 @@ def _set_rate(dialogue: Dialogue, rate: float) -> bool:
         actual = float(answer.removesuffix("KHZ")) * 1e3
     except ValueError:
         raise RigError(
-            f"{dialogue.who} does not report its rate ({answer!r}); its firmware is not supported: use its analogue "
+            f"{dialogue.who} reports an unreadable rate ({answer!r}); its firmware is not supported: use its analogue "
             f"output"
         ) from None
     if not isclose(actual, rate, rel_tol=1e-6):
@@ -113,13 +113,14 @@ def _set_rate(dialogue: Dialogue, rate: float) -> bool:
 _LOCK_TIME = 2.0
 """Longest wait for the first accepted value after the stream is switched on [s]."""
 _SILENT_PERIODS, _SILENT_TIME = 10.0, 0.4
-"""Number of periods and time [s] without data after which a sensor counts as silent. The operating system may deliver
-received bytes in a thread of normal priority, which is delayed by tenths of a second while the processors are busy.
+"""Number of periods and time [s] without data, whichever is longer, after which a sensor counts as silent. The
+operating system may deliver received bytes in a thread of normal priority, which is delayed by tenths of a second while
+the processors are busy.
 """
 _QUIET, _DRAINED = 0.05, 0.5
 _COUNTING, _COUNTED = 0.5, 0.2
-"""Duration [s] of counting values, and largest relative deviation from the set rate; neighbouring rates differ by a
-factor of two.
+"""Duration [s] of counting values, and largest accepted relative deviation from the set rate; adjacent rates differ by
+a factor of two.
 """
 
 
@@ -143,7 +144,7 @@ class SerialLaser:
         serial_number: str | None = None,
     ) -> None:
         if baud is not None and baud not in BAUDS:
-            allowed = f"the sensor supports {', '.join(str(one) for one in sorted(BAUDS))}"
+            allowed = f"the sensor supports {', '.join(str(one) for one in sorted(BAUDS))} baud"
             raise InvalidInput(f"hardware.{name}.baud", baud, allowed)
         self.name = name
         self._who = f"{name} on {port}"
@@ -166,7 +167,7 @@ class SerialLaser:
 
     @property
     def description(self) -> str:
-        """Model, range, serial number, firmware and line of the sensor."""
+        """Model, measuring range, serial number, firmware, port and baud rate of the sensor."""
         return f"{self.info.identity}, {self._port.name} at {self.baud} baud"
 
     @property
@@ -209,10 +210,9 @@ class SerialLaser:
             raise
 
     def take(self) -> Readings:
-        """All values received since the last call, of the last 60 s at most; never waits.
+        """The values received since the last call, limited to the last 60 s; never waits.
 
-        Raises ConnectionLost if the port disappeared or the sensor was switched off in between, RigError before
-        `start`.
+        Raises ConnectionLost if the port has disappeared or the sensor has restarted, RigError before `start`.
         """
         if self._stream is None:
             raise RigError(f"take is refused: {self._who} was not started; start it first")
@@ -264,8 +264,8 @@ class SerialLaser:
             counted.append(stream.take())
         values = [one for one in counted if len(one)]
         first, last = values[0], values[-1]
-        # the first values may have waited in a buffer, so the rate is taken from the last value of the first and last
-        # chunk
+        # the first values may have waited in a buffer, so the rate is computed from the last values of the first and of
+        # the last chunk
         passed = float(last.arrival[-1] - first.arrival[-1])
         steps = int(last.index[-1] - first.index[-1])
         actual = steps / passed if passed > 0.0 else 0.0

@@ -1,4 +1,4 @@
-"""Buffered stream of a sensor's measurements, with a thread that takes them from the process that reads the port."""
+"""Buffered stream of a sensor's measurements, filled by a thread from the output of the process that reads the port."""
 
 from collections import deque
 from dataclasses import dataclass
@@ -59,11 +59,11 @@ class Stream:
 
     @property
     def last_arrival(self) -> float:
-        """Arrival of the last measurement, or start of the stream [s]."""
+        """Arrival time of the last measurement on the machine's clock [s]; initially the start of the stream."""
         return self._last
 
     def ask(self, command: str, timeout: float = USUAL) -> list[str]:
-        """Send a command during the stream; values that arrive with the reply are lost. Raises the errors of
+        """Send a command while streaming; values that arrive with the reply are lost. Raises the errors of
         `Dialogue.ask`.
         """
         reply = Reply()
@@ -80,7 +80,7 @@ class Stream:
         return self._dialogue.judged(command, reply, timeout)
 
     def take(self) -> Readings:
-        """All values since the last call, of the last 60 s at most; never waits. Raises ConnectionLost."""
+        """The values received since the last call, limited to the last 60 s; never waits. Raises ConnectionLost."""
         self._raise_failure()
         with self._changed:
             held, self._held, self._holding = self._held, deque(), 0
@@ -145,7 +145,7 @@ class Stream:
             self._changed.notify_all()
 
     def _fail(self, error: ConnectionLost) -> None:
-        """Make every later call raise `error`."""
+        """Make later calls of `ask` and `take` raise ConnectionLost with the text of `error`."""
         with self._changed:
             self._failure = error
             self._changed.notify_all()

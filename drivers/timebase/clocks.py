@@ -6,13 +6,15 @@ from numpy.typing import NDArray
 from drivers.timebase.fit import Bounds, Points, bends, floor_below, needs_refit, rate_error, typical
 
 _TOLERANCE = 0.25
-"""Deviation of a history from a line, in sample periods, beyond which its older half is discarded. Since counts are
-integers, the bounds drift by a fraction of a period when the readings are synchronous with the clock.
+"""Deviation of the history from a line, in sample periods, beyond which the older half of the history is discarded.
+Since counts are integers, the bounds drift by a fraction of a period if the readings are synchronous with the clock.
 """
 _RECENT = 2.0
 """Longest time over which two bounds can be compared without knowing the clock rate [s]."""
 _CONTRADICTION = 200e-6
-"""Smallest contradiction between two bounds [s]: clocks that differ by 50 ppm drift apart by 100 us in `_RECENT`."""
+"""Overlap of two bounds above which they contradict each other [s]: clocks that differ by 50 ppm drift apart by 100 us
+in `_RECENT`.
+"""
 
 
 class SampleClock:
@@ -58,7 +60,7 @@ class SampleClock:
 
     @property
     def residual(self) -> float:
-        """Root mean square distance [s] of the tightest bounds from the fitted line."""
+        """Root mean square distance [s] of the bounds in the history from the fitted line."""
         self._refresh()
         return self._residual
 
@@ -80,7 +82,7 @@ class SampleClock:
         self._residual = float(np.sqrt(np.mean(off**2)))
 
     def _sides(self) -> list[tuple[Points, float]]:
-        """Valid bounds, each with the sign with which its delays depend on the slope."""
+        """The bounds in use, each with the sign, +1 or -1, by which the slope enters its delays."""
         latest = (self._latest.points, 1.0)
         return [latest] if self._counts_lag else [latest, (self._earliest.points, -1.0)]
 
@@ -102,15 +104,15 @@ def _least(points: Points) -> float:
 
 
 _SENSOR_TOLERANCE = 100e-6
-"""Deviation of a history from a line [s] beyond which its older half is discarded."""
+"""Deviation of the history from a line [s] beyond which the older half of the history is discarded."""
 
 
 class SensorClock:
-    """Estimator of a sensor's clock: second t of the sensor is at second `offset + rate * t` of the machine's clock.
+    """Estimator of a sensor's clock: time t on it is `offset + rate * t` on the machine's clock [s].
 
     The line is the earliest one consistent with the arrivals, so `offset` includes the smallest transfer delay. To
-    track changes, the older half of a history that no single line fits is discarded. All values are NaN before the
-    first reading.
+    track changes, the older half of a history that no single line fits is discarded. `offset`, `rate` and `residual`
+    are NaN before the first reading.
     """
 
     def __init__(self) -> None:
@@ -121,7 +123,7 @@ class SensorClock:
         self._slope = self._offset = self._residual = np.nan
 
     def add(self, time: NDArray[np.float64], arrival: NDArray[np.float64]) -> None:
-        """Add readings, shape (n,): ascending seconds of the sensor's clock, and of the machine's clock at arrival."""
+        """Add readings, shape (n,) each: ascending times on the sensor's clock, and arrivals on the machine's [s]."""
         if time.size == 0:
             return
         # of values that arrive together, the last one has the smallest delay
@@ -131,18 +133,18 @@ class SensorClock:
 
     @property
     def history(self) -> float:
-        """Duration of the history, in seconds of the sensor's clock."""
+        """Time from the first to the last reading, in seconds of the sensor's clock; 0 before the first reading."""
         return max(self._last - self._first, 0.0)
 
     @property
     def offset(self) -> float:
-        """Time on the machine's clock at second 0 of the sensor [s]."""
+        """Time on the machine's clock at which the sensor's clock reads 0 [s]."""
         self._refresh()
         return self._offset
 
     @property
     def rate(self) -> float:
-        """Seconds of the machine's clock per second of the sensor."""
+        """Seconds of the machine's clock per second of the sensor's clock."""
         self._refresh()
         return 1.0 + self._slope
 
@@ -163,7 +165,7 @@ class SensorClock:
         points = self._bounds.points
         floor = floor_below(points, self._slope)
         delay = points.delay - self._slope * points.seconds - floor
-        # delays due to bursts and to the scheduler add up and are rarely both short, so the smallest of n remains above
-        # zero
+        # a delay is the sum of those due to bursts and to the scheduler, which are rarely both short: the smallest of n
+        # delays remains above zero
         self._offset = floor - typical(delay) / np.sqrt(len(points))
         self._residual = float(np.sqrt(np.mean(delay**2)))

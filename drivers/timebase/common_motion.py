@@ -19,8 +19,8 @@ _LEAST = 3
 class CommonMotion:
     """The second signal is `polarity * scale` times the first, `delay` [s] later.
 
-    `uncertainty` is the standard uncertainty of the delay [s], from the scatter of the phases about a line; `scatter`
-    is that scatter [rad], which is large if the two did not measure the same motion.
+    `uncertainty` is the standard uncertainty of the delay [s], from the scatter of the phases about the fitted line;
+    `scatter` is that scatter [rad], which is large if the two sensors did not measure the same motion.
     """
 
     delay: float
@@ -42,7 +42,7 @@ def common_motion(
     if omega.size < _LEAST:
         raise InvalidInput("frequencies", omega.size, f"at least {_LEAST} are required")
     if not (np.abs(first) > 0.0).all() or not (np.abs(second) > 0.0).all():
-        raise InvalidInput("amplitude", 0.0, "both signals must move at every frequency")
+        raise InvalidInput("amplitude", 0.0, "the amplitudes of both signals must not be zero at any frequency")
     order = np.argsort(omega)
     omega, first, second = omega[order], first[order], second[order]
     weight = np.abs(first) ** 2 / np.sum(np.abs(first) ** 2)
@@ -52,7 +52,7 @@ def common_motion(
     moment = float(weight @ omega**2)
     return CommonMotion(
         delay=delay,
-        # the weights are relative; the scatter determines their scale
+        # the weights are only relative, so the variance is estimated from the scatter
         uncertainty=float(np.sqrt(variance * (weight**2 @ omega**2)) / moment),
         polarity=polarity,
         scale=float(abs(np.sum(weight * ratio * np.exp(1j * omega * delay)))),
@@ -63,7 +63,7 @@ def common_motion(
 def _through_origin(
     omega: NDArray[np.float64], ratio: NDArray[np.complex128], weight: NDArray[np.float64]
 ) -> tuple[float, float]:
-    """Delay [s] whose phase line through the origin fits best, and the variance of the phases about it [rad2]."""
+    """Delay [s] of the best-fitting phase line through the origin, and the variance of the phases about it [rad2]."""
     phase = np.unwrap(np.concatenate(([0.0], np.angle(ratio))))[1:]
     delay = -float(weight @ (omega * phase)) / float(weight @ omega**2)
     off = phase + omega * delay

@@ -7,7 +7,7 @@ import numpy as np
 from sim.channel import Counts
 
 _NODES = 4
-"""Number of samples in an interpolation."""
+"""Number of samples used for an interpolated value."""
 _WHOLE = 1.0e-4
 """Distance from a whole number of samples below which a shift is not interpolated [samples]."""
 
@@ -15,10 +15,10 @@ _WHOLE = 1.0e-4
 class Deskew:
     """Aligns samples with the edges of the sample clock: sample i of the result is the value of every signal at edge i.
 
-    Values between samples are interpolated by a cubic through four of them, with an error below 1e-4 of the amplitude
-    at 0.02 of the sample rate. Between two counts, one of which is outside `valid`, the result is that count. `latency`
-    is the number of samples that must have been acquired beyond those returned. Before the first sample, signals are
-    assumed constant.
+    Input k is delayed by `delays[k]` [s]; `rate` is the sample rate [1/s]. Values between samples are interpolated by a
+    cubic through four samples; the error is below 1e-4 of the amplitude at frequencies up to 0.02 of the sample rate.
+    Between two counts, one of which is outside `valid`, the result is that count. `latency` is the number of samples
+    that must have been acquired beyond those returned. Before the first sample, signals are assumed constant.
     """
 
     def __init__(self, delays: Sequence[float], rate: float, valid: Sequence[tuple[int, int]]) -> None:

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 _STRETCH = 0.2
-"""Length of an interval [s], of whose readings the best one is kept; clocks that differ by 50 ppm drift apart by 10 us
-in this time.
+"""Length of an interval [s]; the best reading of each interval is kept. Clocks that differ by 50 ppm drift apart by
+10 us in this time.
 """
 _KEPT = 120.0
 """Duration of the history [s]: long enough for a rate accurate to 1e-6, too short for a quartz clock to drift much."""
@@ -16,8 +16,8 @@ _KEPT = 120.0
 
 @dataclass(frozen=True)
 class Points:
-    """Readings at ascending `seconds` of one clock, shape (n,); `delay`, shape (n,) [s], is another clock's reading
-    minus this one's, or the opposite.
+    """Readings at ascending `seconds` of one clock, shape (n,); `delay`, shape (n,) [s], is the difference between the
+    readings of another clock and this one, of either sign.
     """
 
     seconds: NDArray[np.float64]
@@ -35,7 +35,7 @@ class Bounds:
 
     @property
     def points(self) -> Points:
-        """History: at most one reading per interval, 600 in total."""
+        """The history: at most one reading per interval of 0.2 s, so about 600 in total."""
         return self._points
 
     def add(self, seconds: NDArray[np.float64], delay: NDArray[np.float64]) -> None:
@@ -63,17 +63,17 @@ class Bounds:
 
 
 _RATE_SPREAD = 50e-6
-"""Standard deviation of the relative rate error between two quartz clocks [1]."""
+"""Standard deviation of the prior of the relative rate error between two quartz clocks [1]."""
 _LARGEST = 1e-3
 """Largest rate error searched for [1]: a machine's clock is slewed by at most 500 ppm."""
 _HALVINGS = 18
 """Number of bisections, which give the rate to 4e-9, a quarter of a microsecond per minute."""
 _STEPS = 2.0 ** np.arange(-30, -9)
-"""Steps from the most probable rate to find the width of its distribution: 1e-9 to 1e-3."""
+"""Steps from the most probable rate, 1e-9 to 1e-3, to find the width of its posterior [1]."""
 _NEGLIGIBLE = 8.0
 """Slopes whose log posterior is below its maximum by more than this are neglected."""
 _GRID = 41
-"""Number of slopes over which the mean is taken."""
+"""Number of slopes in the average over the posterior."""
 _RESOLUTION = 1e-7
 """Mean delay below which readings are considered exact [s]."""
 _FAR = 5.0
@@ -92,14 +92,16 @@ _PATIENCE = 1.0
 
 
 def needs_refit(history: float, fitted: float) -> bool:
-    """Whether a line over `history` [s] must be refitted if it was last fitted at `fitted` [s]."""
+    """Whether a line must be refitted to a history of length `history` [s] if the length was `fitted` [s] at the last
+    fit.
+    """
     return history - fitted >= min(_GROWTH * history, _PATIENCE)
 
 
 def rate_error(sides: Sequence[tuple[Points, float]]) -> float:
-    """Common slope of the lines below the points of `sides`: the mean of its posterior.
+    """Posterior mean of the common slope of the lines that bound the points of `sides` from below.
 
-    Each side has a sign; its delays grow by sign times slope. Two-sided bounds have the signs +1 and -1.
+    Each side has a sign; its delays grow by sign times slope per second. Two-sided bounds have the signs +1 and -1.
     """
     given = [_side(points.seconds, points.delay, sign) for points, sign in sides]
     rough = _most_probable(given)
@@ -172,10 +174,11 @@ def typical(above: NDArray[np.float64]) -> float:
 
 
 def bends(points: Points, slope: float, tolerance: float) -> bool:
-    """Whether the points deviate from the line by more than `tolerance` [s] plus chance, as after a change of the rate.
+    """Whether the points deviate from a line of this slope by more than `tolerance` [s] and random scatter, as after a
+    change of the rate.
 
     Compares the smallest delay in each of the last three quarters of the history. The first quarter is ignored, since
-    its readings may have been made differently.
+    its readings may have been taken under different conditions.
     """
     size = len(points) // 4
     if size < _QUARTER:

@@ -1,9 +1,9 @@
 """Alignment of a sensor's clock by pulses on the sample clock that switch the beam of the sensor off.
 
-Each rising edge lies between the last measurement with the beam and the first one without it, which bounds the offset
-between the clocks to one measuring cycle. The edges are spaced by a golden-ratio fraction of a cycle, so that their
-phases are evenly distributed over it: the bounds of 40 edges differ by a 30th of a cycle, 8 us at 4000 1/s (three-gap
-theorem).
+Each rising edge occurs between the last measurement with the beam and the first one without it, which bounds the offset
+between the clocks to one measuring cycle. The spacing of the edges is a whole number of cycles plus the golden-ratio
+fraction of a cycle, so that their phases are evenly distributed over the cycle: the bounds of 40 edges differ by a 30th
+of a cycle, 8 us at 4000 1/s (three-gap theorem).
 """
 
 from dataclasses import dataclass
@@ -46,20 +46,22 @@ class Pulses:
 
 
 def golden_pulses(rate: float) -> Pulses:
-    """Pulses that mark the clock of a sensor with this measuring rate [1/s]."""
+    """Pulses for the alignment of a sensor with measuring rate `rate` [1/s]."""
     half = 0.5 * (max(round(_SPACING * rate), _CYCLES) + _GOLDEN) / rate
     return Pulses(_BEGIN, half, half, _EDGES)
 
 
 def expected_uncertainty(rate: float) -> float:
-    """Standard uncertainty [s] of the alignment of a sensor with this measuring rate [1/s], without jitter."""
+    """Standard uncertainty [s] of the alignment of a sensor with measuring rate `rate` [1/s], without jitter."""
     return _ERROR / rate
 
 
 _ERROR = 0.014
 """Root mean square error, over all phases, of the midpoint between the bounds from 40 edges, in measuring cycles."""
 _RATES = 1e-6 * np.arange(-150.0, 151.0)
-"""Deviations from the given rate that are searched; a rate from arrival times is wrong by a few 10 ppm at worst."""
+"""Deviations from the given rate that are searched [1]; a rate estimated from arrival times is wrong by a few tens of
+ppm at worst.
+"""
 _RATE_SPREAD = 40e-6
 """Standard uncertainty of the given rate in the first second of a run, on a busy computer [1]."""
 
@@ -78,17 +80,17 @@ class Mark:
 def marked_point(
     pulses: Pulses, time: NDArray[np.float64], is_lit: NDArray[np.bool_], rate: float, rough: float
 ) -> Mark | None:
-    """The point at the middle of the pulses, which depends least on the rates of the clocks.
+    """The common point in the middle of the pulses, which depends least on the rates of the clocks.
 
-    `time` [s of the sensor's clock], shape (n,), are the ascending times of the measurements, and `is_lit`, shape (n,),
-    is False for those without the beam. `rate` is the number of seconds of the sample clock per second of the sensor;
-    `rough` is the time on the sample clock at second 0 of the sensor [s], to within half the time between two pulses.
-    Returns None if fewer than half of the edges are found.
+    `time`, shape (n,), contains the ascending times of the measurements on the sensor's clock [s]; `is_lit`, shape
+    (n,), is False for those without the beam. `rate` is the number of seconds of the sample clock per second of the
+    sensor's clock; `rough` is the time on the sample clock at which the sensor's clock reads 0 [s], known to within
+    half the time between two pulses. Returns None if fewer than half of the edges are found.
     """
     onsets = np.flatnonzero(is_lit[:-1] & ~is_lit[1:]) + 1
     if not onsets.size:
         return None
-    # the first onset is attributed to the edge that is nearest to it according to the rough offset
+    # the first onset of darkness is attributed to the nearest edge according to the rough offset
     candidates = pulses.edges - rate * float(time[onsets[0]])
     rough = float(candidates[np.argmin(np.abs(candidates - rough))])
     cycle = float(np.median(np.diff(time)))
@@ -104,11 +106,11 @@ def marked_point(
     rates = rate + _RATES[:, None]
     low = (edges - rates * (time[onsets] - middle)).max(axis=1)
     high = (edges - rates * (time[onsets - 1] - middle)).min(axis=1)
-    # every point between the bounds is equally probable, at rates near the given one
+    # for each rate, all points between the bounds are equally probable; rates near the given one are more probable
     width, centre = high - low, 0.5 * (low + high)
     weight = np.maximum(width, 0.0) * np.exp(-0.5 * (_RATES / _RATE_SPREAD) ** 2)
     if not weight.any():
-        # with jitter of the sensor the bounds may contradict each other at every rate
+        # because of the sensor's jitter, the bounds may contradict each other at every rate
         weight[np.argmax(width)] = 1.0
     weight /= weight.sum()
     seconds = float(weight @ centre)

@@ -11,7 +11,7 @@ from drivers.rig import Alignment, RawValues
 
 @dataclass(frozen=True)
 class Marks:
-    """Numbers that mark samples without a value: lost between two values, not arrived in time, or implausible."""
+    """Counts that mark samples without a valid value: lost, not received in time, or implausible."""
 
     lost: int
     late: int
@@ -19,8 +19,8 @@ class Marks:
 
 
 class Resampler:
-    """Interpolates within the last `capacity` readings or more; a reading consists of its index, its time on the
-    sensor's clock [s], and counts or a fault mark.
+    """Interpolates between readings, of which at least the last `capacity` are kept. A reading consists of its index,
+    its time on the sensor's clock [s], and counts or a fault mark.
 
     Counts beyond +-`largest` are fault marks; `lost_mark` marks missing values, `late_mark` values not yet received.
     """
@@ -34,11 +34,13 @@ class Resampler:
 
     @property
     def last(self) -> tuple[int, float] | None:
-        """Index and time of the newest reading."""
+        """Index and time [s] of the newest reading; None without readings."""
         return (int(self._index[self._end - 1]), float(self._time[self._end - 1])) if self._end else None
 
     def values(self, begin: float) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-        """Times [s] of the readings from `begin` on, and a mask of those that are counts, shape (n,) each."""
+        """Times [s] of the readings from the time `begin` [s] on, and a mask that is False for fault marks, shape (n,)
+        each.
+        """
         first = int(np.searchsorted(self._time[: self._end], begin))
         kept = slice(first, self._end)
         return self._time[kept].copy(), np.abs(self._counts[kept].astype(np.int32)) <= self._largest
@@ -83,8 +85,8 @@ class Resampler:
 
 
 RARE, RECOVERY = 3.0, 0.05
-"""Number of implausible values within a short time from which further ones are no longer considered single faults, and
-the decrease of that number per plausible value.
+"""Number of implausible values at which further ones are no longer considered single faults, and the decrease of that
+number per plausible value.
 """
 
 
@@ -152,9 +154,9 @@ def resampled(
     times according to its `alignment`.
 
     Values that arrived too late for their block are included. `marked` converts the words of the sensor to counts of at
-    most +-`largest`, or to fault marks beyond.
+    most +-`largest`, or to fault marks outside that range.
     """
-    # of repeated values, the first one counts
+    # of repeated values, the first one is used
     order = np.flatnonzero(raw.time > np.maximum.accumulate(np.concatenate(([-1], raw.time[:-1]))))
     resampler = Resampler(max(order.size, 2), largest, marks.lost, marks.late)
     resampler.add(raw.index[order], np.multiply(1e-6, raw.time[order], dtype=np.float64), marked(raw.code[order]))

@@ -14,7 +14,7 @@ from drivers.timebase.resampling import Marks, Plausibility, Resampler
 
 @dataclass(frozen=True)
 class Line:
-    """Linear relation of two clocks: `time` on the first is `seconds` on the second, which runs `rate` times as fast.
+    """Linear relation of two clocks: `time` [s] on the first is `seconds` [s] on the second, `rate` times as fast.
 
     The point (`time`, `seconds`) is close to the present, to avoid rounding errors on clocks that have run for weeks.
     """
@@ -33,11 +33,13 @@ class Line:
 
 
 _SLEW = 50e-6
-"""Largest slew rate of the clock relation [s/s]: at 1 m/s it causes an error of 50 um/s."""
+"""Largest slew rate of the clock relation [s/s]: if the target moves at 1 m/s, its position error grows by 50 um/s."""
 _FIRST_SLEW = 500e-6
-"""Largest slew rate in the first phase of a run [s/s], when the lines are known only to a fraction of a millisecond."""
+"""Largest slew rate in the first phase of a run [s/s], when the clock relation is only known to a fraction of a
+millisecond.
+"""
 _FIRST = 10.0
-"""Duration of the first phase [s]."""
+"""Duration of the first phase of a run [s]."""
 
 
 class Course:
@@ -57,7 +59,7 @@ class Course:
         """
         end = float(seconds[-1])
         if not self._seconds < float(seconds[0]):
-            # at the first request, and at a request for the past, there is no point to continue from
+            # the first request, and a request for an earlier time, do not continue a previous one
             self._began = self._seconds = float(seconds[0])
             self._time = line.time_at(self._seconds)
         passed = end - self._seconds
@@ -80,7 +82,7 @@ class Course:
         return min(max(known, early), late)
 
     def _after(self, line: Line, passed: float) -> float:
-        """The sensor time after `passed` seconds: on the line, or as close to it as the slew limit allows."""
+        """Sensor time [s] after a further `passed` [s]: on the line, or as close to it as the slew limit allows."""
         free = self._time + passed / line.rate
         allowed = self._slew * passed
         return min(max(line.time_at(self._seconds + passed), free - allowed), free + allowed)
@@ -93,9 +95,9 @@ class Course:
 _KEPT = 10.0
 """Duration held by the buffer of values [s]."""
 _LEAST_HISTORY = 1.0
-"""Shortest history of a clock with which values are placed [s]."""
+"""Shortest history of the sensor's clock with which its values are aligned to the sample clock [s]."""
 _BACK = 0.25
-"""Age relative to the newest value [s] above which a value is not a repetition but follows a restart of the sensor's
+"""Backward step of the sensor's time [s] above which a value is not a repetition but follows a restart of the sensor's
 clock.
 """
 
@@ -130,7 +132,7 @@ class SensorTrack:
         self._asked = 0.0
 
     def begin(self) -> None:
-        """Begin a run: the counts of values are reset, and the history of the sensor's clock is kept."""
+        """Begin a run: the numbers of values are reset; the history of the sensor's clock is kept."""
         self._course = Course()
         self._mark = None
         self._values = self._lost = self._late = 0
@@ -152,15 +154,15 @@ class SensorTrack:
             self._add(index[part], time[part], code[part], arrival[part])
 
     def reach(self, clock: SampleClock) -> float:
-        """Time on the sample clock up to which values are available [s]; minus infinity if none can be placed."""
+        """Time on the sample clock up to which values are available [s]; minus infinity if no value can be aligned."""
         line, last = self._line(clock), self._resampler.last
         if line is None or last is None:
             return -np.inf
         return self._course.reach(line, last[1])
 
     def mark(self, clock: SampleClock, pulses: Pulses) -> bool:
-        """Align the sensor's clock by pulses that have switched its beam off. Returns False if too few of them are
-        found in its values, or one of the clocks is still unknown.
+        """Align the sensor's clock by pulses that have switched its beam off. Returns False if too few pulses are found
+        in the values, or if the relation of the clocks is still unknown.
         """
         self._mark = None
         line = self._line(clock)
@@ -188,7 +190,7 @@ class SensorTrack:
         return counts
 
     def alignment(self, clock: SampleClock) -> Alignment:
-        """Alignment of the sensor's clock in this run; unknown items are NaN."""
+        """Alignment of the sensor's clock in this run; `offset`, `rate` and `residual` are NaN while unknown."""
         line, last = self._line(clock), self._resampler.last
         behind = self._asked if last is None else self._course.time - last[1]
         return Alignment(

@@ -1,4 +1,4 @@
-"""Check lines: comparison of the sensors under a common motion."""
+"""Lines of the loop check that compare the sensors under a common motion."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -76,10 +76,11 @@ _SKEW = (
 def table_delay_lines(
     sines: Sines, parameters: CheckParameters, sample_rate: float, *, lasers: bool, most: float = inf
 ) -> Iterator[CheckLine]:
-    """Delay of the accelerometer against the table's displacement sensor, and of each laser on the ground against the
-    accelerometer, at most `most` [s]. Together with `delay_lines`, every pair of channels is compared.
+    """Lines for the delay of the accelerometer against the table's displacement sensor and, with `lasers` on the
+    ground, of each laser against the accelerometer, at most `most` [s]. Together with `delay_lines`, every pair of
+    channels is compared.
 
-    The limits include half a sample, by which an acceleration that follows each step of the held output lags.
+    The limits include half a sample: the lag of an acceleration that follows each step of the zero-order-hold output.
     """
     if parameters.delay_tolerance is None:
         return
@@ -117,10 +118,11 @@ def _delay_between(omega: NDArray[np.float64], first: Amplitudes, second: Amplit
 
 
 def scale_lines(sines: Sines, parameters: CheckParameters, *, lasers: bool) -> Iterator[CheckLine]:
-    """Two lines for each sensor except the reference.
+    """Lines for polarity and scale of each sensor against the reference and, with `lasers` on the ground, for the scale
+    of one laser against the other.
 
-    The reference is the table's displacement sensor, or the accelerometer if it differs from that sensor and the lasers
-    agree with it. `lasers` mounted on the ground are compared as well.
+    The reference is the table's displacement sensor, or the accelerometer if the two differ and the lasers agree with
+    the accelerometer.
     """
     sensors = SENSORS if lasers else TABLE
     seen: dict[str, Amplitudes] = {name: getattr(sines, sensor.signal) for name, sensor in sensors.items()}
@@ -153,9 +155,10 @@ def scale_lines(sines: Sines, parameters: CheckParameters, *, lasers: bool) -> I
 
 
 def delay_lines(sines: Sines, parameters: CheckParameters, configuration: BenchConfiguration) -> Iterator[CheckLine]:
-    """One line for each laser, one for their difference, and the setting that compensates the common delay.
+    """Lines for the delay of each laser and for the difference of the delays; for serial lasers of a real bench, also
+    the value of the setting that compensates the mean delay.
 
-    A delay is positive where the laser lags behind the table's displacement.
+    A delay is positive if the laser lags behind the table's displacement.
     """
     most = allowed_delay(configuration.known_specimen, parameters.highest_omega, parameters.u1_error)
     hardware = configuration.hardware.lasers
@@ -193,7 +196,7 @@ def delay_lines(sines: Sines, parameters: CheckParameters, configuration: BenchC
 
 
 def signed_scale(omega: NDArray[np.float64], amplitudes: Amplitudes, reference: Amplitudes) -> tuple[float, float]:
-    """Scale of a sensor relative to another, negative for opposite polarity, and its standard uncertainty.
+    """Scale of one sensor relative to another, negative for opposite polarity, and its standard uncertainty.
 
     The magnitude is extrapolated to zero frequency with a term in omega^2: a mass on a compliant clamp moves more than
     the table, by the fraction (omega / omega_clamp)^2.

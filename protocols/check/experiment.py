@@ -51,13 +51,13 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 REST = 2.0
-"""Time at rest before the table moves, in which the signals are zeroed [s]."""
+"""Time at rest before the table moves, during which the signals are zeroed [s]."""
 
 WIDTH = 118
 """Width of a text line in characters."""
 
 _OUTSIDE = 1.5
-"""Position at which values far beyond their limits are drawn."""
+"""Position at which values far beyond their limits are drawn, in units of half the allowed range."""
 
 _DRIVE = len(SIGNALS)
 _FALLEN = "storey 1 has a permanent offset although there is no block on the table: check lasers and specimen"
@@ -83,10 +83,12 @@ class LoopCheck(Prepared[CheckParameters]):
         if velocity > limits.velocity:
             raise InvalidInput("velocity", velocity, f"it must not exceed limits.velocity = {limits.velocity:g} m/s")
         if velocity / slow > reach:
-            needs = f"a velocity of {velocity:g} m/s at this frequency needs {1e3 * velocity / slow:.1f} mm"
+            needs = (
+                f"a velocity of {velocity:g} m/s at this frequency requires {1e3 * velocity / slow:.1f} mm of stroke"
+            )
             raise InvalidInput("omega", slow, f"{needs}, but the bench allows {1e3 * reach:.1f} mm")
         if velocity * fast > limits.acceleration:
-            needs = f"a velocity of {velocity:g} m/s at this frequency needs {velocity * fast:.3g} m/s2"
+            needs = f"a velocity of {velocity:g} m/s at this frequency requires {velocity * fast:.3g} m/s2"
             raise InvalidInput("omega", fast, f"{needs}, but limits.acceleration = {limits.acceleration:g} m/s2")
 
     @cached_property
@@ -116,7 +118,7 @@ class LoopCheck(Prepared[CheckParameters]):
 
 
 def _steps(parameters: CheckParameters, configuration: BenchConfiguration) -> Generator[Step, Outcome, None]:
-    """Steps of the check; each line is published as a point when it has been measured."""
+    """Steps of the check; each line is published as a point as soon as it has been measured."""
     bare = configuration.known_specimen.bare()
     yield OperatorAction(OperatorTask.LOCK_FRAME, bare, _CLAMP)
     yield Publish(StepStarted("acquire at rest"))
@@ -131,7 +133,7 @@ def _steps(parameters: CheckParameters, configuration: BenchConfiguration) -> Ge
     yield from _publish(input_lines(at_rest.channels))
     yield from _publish(alignment_lines(at_rest.alignments, configuration))
     if any(line.verdict is Verdict.FAILED for line in resting):
-        remedy = "the table was not moved: correct the failed lines, then check again"
+        remedy = "the table was not moved: correct the failures found at rest, then repeat the check"
         yield from _publish([untested("bench", "motion", remedy)])
     else:
         yield from _motion(parameters, configuration)
@@ -166,7 +168,7 @@ def _publish(lines: Iterable[CheckLine]) -> Generator[Step, Outcome, None]:
 
 
 def _measured_sines(parameters: CheckParameters) -> Generator[Step, Outcome, Sines]:
-    """Calibrate the drive in small steps, then drive the table and measure. Raises Unmeasurable if the response is
+    """Calibrate the drive, then measure the sines of all frequencies. Raises Unmeasurable if the response is
     insufficient.
     """
     omegas = sorted(parameters.omega)
@@ -219,7 +221,7 @@ _COLUMNS = (
 
 
 def _table(lines: Sequence[CheckLine]) -> str:
-    """Text table of the lines, each followed by its remedy, and the number of lines by verdict."""
+    """Text table of the lines, each followed by its remedy, if any, and the number of lines by verdict."""
     title, rule, *rows = text_table(_COLUMNS, map(_cells, lines)).splitlines()
     text = [title, rule]
     for line, row in zip(lines, rows, strict=True):

@@ -1,4 +1,4 @@
-"""Check lines: bench at rest, and drive."""
+"""Lines of the loop check for the bench at rest and for the drive."""
 
 from collections.abc import Iterator, Sequence
 from math import isinf
@@ -19,17 +19,19 @@ from protocols.check.protocol import CheckParameters
 from sim.channel import STOREYS, TABLE_ACCELERATION, TABLE_DISPLACEMENT
 
 _STUCK = 0.01
-"""Scatter [counts] below which a channel is considered stuck; one differing sample in ten thousand exceeds it."""
+"""Standard deviation [counts] below which a channel is considered stuck, about that of one sample in ten thousand that
+differs by one count.
+"""
 
 _FINEST = 1e-5
 """Step of the search for the dead time [s]."""
 
-_UNKNOWN = "the delay of this module is unknown: compare the delay lines, or use a supported module"
+_UNKNOWN = "the delay of this input module is unknown: compare the delay lines, or use a supported module"
 _OF_THE_LINE = {
     LATE: "the computer was busy, or the sensor is silent: close other programs, increase acquisition.lead,"
     " or check the sensor's power and port",
     LOST: "check the cable, the RS422 adapter and its latency timer",
-    IMPLAUSIBLE: "bits were changed on the line: check the cable, its shield and the RS422 adapter",
+    IMPLAUSIBLE: "bit errors on the serial line: check the cable, its shield and the RS422 adapter",
 }
 """Remedies for values that were measured but arrived late, corrupted or not at all."""
 _MISSING = "the program does not read this input: make sure that its contact opens the enable chain directly"
@@ -56,7 +58,7 @@ def resting_lines(samples: RestSamples, parameters: CheckParameters, accuracy: S
 
 
 def safety_lines(configuration: BenchConfiguration) -> Iterator[CheckLine]:
-    """One line for each safety input after the acquisition at rest; none for a simulated bench.
+    """Lines for safety inputs and a missing watchdog, after the acquisition at rest; none for a simulated bench.
 
     Inputs that are read have passed, since an open input would have prevented arming or ended the check; missing inputs
     are untested.
@@ -73,7 +75,7 @@ def safety_lines(configuration: BenchConfiguration) -> Iterator[CheckLine]:
 
 
 def input_lines(channels: Sequence[Channel]) -> Iterator[CheckLine]:
-    """A line for each input whose delay was removed from its samples or is unknown."""
+    """A line for each input whose delay is unknown or was removed from its samples."""
     for channel in channels:
         if isinf(channel.delay_uncertainty):
             yield untested(channel.name, "input delay", _UNKNOWN)
@@ -83,7 +85,9 @@ def input_lines(channels: Sequence[Channel]) -> Iterator[CheckLine]:
 
 
 def alignment_lines(alignments: Sequence[Alignment], configuration: BenchConfiguration) -> Iterator[CheckLine]:
-    """Two lines for each sensor with its own clock: accuracy of the alignment by its method, and the delay added."""
+    """Two lines for each sensor with its own clock: accuracy of the alignment of the clocks, and the delay added to the
+    times of its values.
+    """
     expected = expected_uncertainty(configuration.hardware.lasers.rate)
     for one in alignments:
         if isinf(one.mark_uncertainty):
@@ -131,7 +135,8 @@ def expected_drive(omega: NDArray[np.float64], configuration: BenchConfiguration
 def dead_time(
     omega: NDArray[np.float64], drive: NDArray[np.complex128], acceleration: NDArray[np.complex128], longest: float
 ) -> float:
-    """Signed delay [s] between drive and motion not explained by mass, dashpot and spring, up to twice `longest`.
+    """Signed delay [s] between drive and motion not explained by mass, dashpot and spring, of at most twice `longest`
+    [s].
 
     drive / acceleration = exp(s T) (m + c / s + k / s^2) / G with s = i omega. For each T, the quotients m / G, c / G
     and k / G are fitted by linear least squares; the result is the T with the smallest residual. It includes the delays
@@ -172,7 +177,7 @@ def _reason(channel: Channel, invalid: Counts) -> str:
     why = channel.faults.get(most)
     if why is None:
         end = "lower" if most < channel.valid[0] else "upper"
-        why = f"beyond its {end} end"
+        why = f"beyond the {end} end of its range"
     if (remedy := _OF_THE_LINE.get(most)) is not None and most in channel.faults:
         return f"{why}: {remedy}"
     if channel.name in STOREYS:

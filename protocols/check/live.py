@@ -12,8 +12,8 @@ CHANNELS = (TABLE_DISPLACEMENT, TABLE_ACCELERATION, *STOREYS)
 
 
 def check_view(run: LiveRun) -> LiveView:
-    """The published lines, then the pending ones, which every check of this bench has. None is pending after the line
-    that the motion failed or was not permitted.
+    """The published lines, followed by the pending ones, as far as they are known in advance. None is pending after a
+    line reports that the motion failed or was not permitted.
     """
     lines = [point for point in run.points if isinstance(point, CheckLine)]
     known = {(line.subject, line.what) for line in lines}
@@ -30,7 +30,7 @@ def check_view(run: LiveRun) -> LiveView:
 
 
 def expected(parameters: CheckParameters, *, on_ground: bool) -> Iterator[tuple[str, str]]:
-    """Subject and quantity of the lines that do not depend on the results, in the order of the run."""
+    """Subject and quantity of the lines that do not depend on the results, in the order in which they are published."""
     for channel in CHANNELS:
         yield channel, "valid samples at rest"
         yield channel, "noise at rest"

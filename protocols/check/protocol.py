@@ -26,27 +26,27 @@ class CheckParameters(Parameters):
     cycles: int = quantity(8, "1", "number of cycles measured at each frequency", ge=4, le=200)
     rest: float = quantity(2.0, "s", "time at rest in which noise and valid samples are evaluated", ge=0.5, le=60)
     displacement_noise: float = quantity(
-        1e-4, "m", "largest standard deviation of the table's displacement at rest", gt=0
+        1e-4, "m", "largest allowed standard deviation of the table's displacement at rest", gt=0
     )
     acceleration_noise: float = quantity(
-        0.02, "m/s2", "largest standard deviation of the table's acceleration at rest", gt=0
+        0.02, "m/s2", "largest allowed standard deviation of the table's acceleration at rest", gt=0
     )
     scale_tolerance: float = quantity(
-        0.02, "1", "largest relative difference between the scales of two sensors", gt=0, lt=0.5
+        0.02, "1", "largest allowed relative difference between the scales of two sensors", gt=0, lt=0.5
     )
     drive_tolerance: float = quantity(
-        0.25, "1", "largest relative difference between measured and expected drive", gt=0, lt=1
+        0.25, "1", "largest allowed relative difference between measured and expected drive", gt=0, lt=1
     )
-    latency: float = quantity(0.02, "s", "longest dead time from drive to sample", gt=0, le=1)
+    latency: float = quantity(0.02, "s", "longest allowed dead time from drive to sample", gt=0, le=1)
     delay_tolerance: float | None = quantity(
         2e-4,
         "s",
-        "largest difference between the delays of the table's two sensors; the accelerometer may lag by half a sample "
-        "more, since the output is held between samples; if absent, they are not compared",
+        "largest allowed difference between the delays of the table's two sensors; the accelerometer may lag by half a "
+        "sample more, since the output is held between samples; if absent, the delays are not compared",
         gt=0,
         le=0.1,
     )
-    u1_error: float = quantity(0.01, "1", "largest relative error of u1 that a laser's delay may cause", gt=0, lt=0.5)
+    u1_error: float = quantity(0.01, "1", "largest allowed relative error of u1 due to a laser's delay", gt=0, lt=0.5)
     highest_omega: float = quantity(
         20.0, "rad/s", "highest frequency of later tests, where a delay has the largest effect", gt=0, le=60
     )

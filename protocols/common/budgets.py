@@ -17,9 +17,10 @@ MOST = 16
 
 @dataclass(frozen=True)
 class Budgeted:
-    """A result with its expanded uncertainty and its standard uncertainties by contribution, all in its own unit.
+    """A result with its expanded uncertainty and its standard uncertainties by contribution, all in the unit of the
+    result.
 
-    `correlations` are those between the errors in the two tests whose ratio is the result, by contribution.
+    If the result is the ratio of two tests, `correlations` are those between the errors of the two, by contribution.
     """
 
     label: str
@@ -30,12 +31,12 @@ class Budgeted:
 
     @property
     def percent(self) -> float:
-        """The expanded uncertainty [%]."""
+        """The relative expanded uncertainty [%]."""
         return 100.0 * self.expanded / abs(self.value)
 
     @property
     def shares(self) -> dict[str, float]:
-        """Standard uncertainties by contribution [%]."""
+        """Relative standard uncertainties by contribution [%]."""
         return {name: 100.0 * part / abs(self.value) for name, part in self.parts.items()}
 
 
@@ -46,8 +47,8 @@ def budgeted(
     expanded: float | None = None,
     correlations: str | None = None,
 ) -> list[Budgeted]:
-    """A result whose contributions are `parts`, as JSON; empty if the file has no budget for it. By default,
-    the expanded uncertainty is computed from the parts.
+    """List of one result, with its contributions `parts` and `correlations` given as JSON; empty if the file contains
+    no value or no budget. By default, the expanded uncertainty is computed from the parts.
     """
     if not value or not parts:
         return []

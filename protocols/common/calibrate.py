@@ -72,7 +72,8 @@ def calibrate_drive(
 
 
 def probed_drive(omega: float) -> Generator[Step, Outcome, DriveCalibration]:
-    """Gain of the drive at `omega` [rad/s], measured with two commands that are too small to cause damage.
+    """Frequency-independent calibration with the gain of the drive at `omega` [rad/s], measured with two commands that
+    are too small to cause damage.
 
     The mean over the cycles is compared with their scatter, to separate a response from noise of any spectrum. Raises
     Unmeasurable if the table does not respond.
@@ -89,8 +90,9 @@ def probed_drive(omega: float) -> Generator[Step, Outcome, DriveCalibration]:
     gain, doubt = abs(complex(answer.mean())), _standard_error(answer)
     if not gain > AUDIBLE * doubt:
         raise Unmeasurable(
-            f"the table does not respond to a drive of {10.0 * PROBE:g} V: {gain:.2g} m/s2 per volt, noise {doubt:.2g};"
-            " check the amplifier, the enable line, the emergency stop and the accelerometer"
+            f"the table does not respond to a drive of {10.0 * PROBE:g} V: {gain:.2g} m/s2 per volt measured, noise"
+            f" {doubt:.2g} m/s2 per volt; check the amplifier, the enable line, the emergency stop and the"
+            " accelerometer"
         )
     return DriveCalibration.flat(gain)
 
@@ -100,7 +102,7 @@ def _standard_error(values: NDArray[np.complex128]) -> float:
 
 
 def harmonic_frequencies(omega: float, highest: int) -> list[float]:
-    """Frequencies [rad/s] above `omega` up to its harmonic `highest`, half an octave apart."""
+    """Frequencies [rad/s] above `omega` up to its harmonic `highest`, at most half an octave apart."""
     steps = ceil(2.0 * log2(highest))
     return [omega * highest ** (step / steps) for step in range(1, steps + 1)]
 
@@ -110,7 +112,7 @@ def _of(points: dict[float, complex]) -> DriveCalibration:
 
 
 def _measure(omega: float, amplitude: float) -> Generator[Step, Outcome, complex | Fallen]:
-    """Response [m/s2 per V] at one frequency."""
+    """Response of the table [m/s2 per V] at `omega` [rad/s]; `Fallen` if the block has fallen."""
     outcome = yield Sweep((Segment(CHANGE_TIME, amplitude, omega),))
     if isinstance(outcome, Fallen):
         return outcome
@@ -139,8 +141,8 @@ def need_cycles(cycles: Sequence[Cycle], asked: int) -> None:
     """Raise Unmeasurable if too many cycles have missing samples."""
     if len(cycles) < ENOUGH * asked:
         raise Unmeasurable(
-            f"{asked - len(cycles)} of {asked} cycles have missing samples: a sensor exceeds its range, or its "
-            "values are late; the data file states the reason for each sample. Move the sensor, reduce the motion, "
+            f"{asked - len(cycles)} of {asked} cycles have missing samples: a sensor exceeded its range, or its "
+            "values were late; the data file states the reason for each sample. Move the sensor, reduce the motion, "
             "increase acquisition.lead, or close other programs"
         )
 

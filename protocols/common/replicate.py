@@ -1,4 +1,4 @@
-"""Replication stage of other protocols, which iterates the drive until the table follows a motion."""
+"""Replication stage of several protocols, which iterates the drive until the table follows a motion."""
 
 from collections.abc import Callable, Generator
 from dataclasses import dataclass
@@ -24,19 +24,19 @@ STEP = 0.01
 """Time step of a `TableMotion` [s]."""
 
 REST = 2.0
-"""Time at rest before each pass, in which the signals are zeroed [s]."""
+"""Time at rest before each pass, during which the signals are zeroed [s]."""
 
 
 @event(table="passes", notice="pass")
 class PassFinished(Event):
-    """Pass `number` of a replication, the iteration that makes the table follow `motion`, has ended.
+    """The end of pass `number` of a replication, the iteration that makes the table follow `motion`.
 
     `error`, `repeatable`, `peak_error` and `spectrum_error` are relative, see `bench.control.passes.Pass`; `text`
     summarises the pass.
     """
 
     time: float = column("s", "bench time at the end of the pass", default=nan, kw_only=True)
-    motion: str = column("", "motion commanded to the table")
+    motion: str = column("", "name of the motion that the table is to follow")
     number: int = column("1", "number of the pass, from 1 for each replication")
     error: float = column("1", "measured rms error relative to the rms of the target")
     repeatable: float = column("1", "error excluding its non-repeatable part")
@@ -52,8 +52,8 @@ class PassFinished(Event):
 
 @event(journalled=False, eq=False)
 class TableMotion(Event):
-    """Accelerations of the table, `achieved` in one `play` of a drive and `target` [m/s2], shape (n,), at the `seconds`
-    since the start of the drive. For the live view only, since the file has every sample.
+    """Accelerations of the table [m/s2], shape (n,): `achieved` in one `play` of a drive, and `target`, at the times
+    `seconds` [s] from the start of the drive. For the live view only, since the file contains every sample.
     """
 
     motion: str
@@ -87,7 +87,7 @@ class Replicated:
     response spectrum that noise does not explain, with its period [s].
 
     `status` and `reason` describe how the passes ended. The status is "running" if the block `fell` before the end; the
-    block then lies in its catch, and the caller must have it set upright.
+    caller must then have it set upright.
     """
 
     drive: Array
@@ -113,7 +113,7 @@ def replicate(
     The event from `progress` is published after each pass. A pass with missing samples of the table's sensors is
     repeated; after a second loss the best drive so far is returned. The rig must not be armed on entry, and is not
     armed on return. Raises InvalidInput if the model does not cover the target, or if the first drive exceeds a limit
-    and may not be scaled.
+    and scaling it is not allowed.
     """
     replication = Replication(target, model, limits, parameters)
     achieved: Array | None = None
@@ -130,7 +130,7 @@ def replicate(
         if lost:
             if again or fell:
                 return _replicated(replication, achieved, fell=fell, lost=lost)
-            yield Publish(Warned(f"{name}: {lost} samples of the table's motion are missing; the pass is repeated"))
+            yield Publish(Warned(f"{name}: samples of the table's motion are missing ({lost}); the pass is repeated"))
             continue
         report = replication.learn(moved[:, 0], moved[:, 1])
         if report.accepted:

@@ -48,7 +48,7 @@ BARE, SPRING = "bare frame", "spring of beta = {:g}"
 """Names of the mounted specimens."""
 
 BY_HAND = 120.0
-"""Time to mount a spring [s]."""
+"""Expected time to change the specimen by hand [s]."""
 
 STILL_CLAMPED = "THE BLOCK IS STILL CLAMPED to the table: remove clamp, spring and block before the table is driven."
 
@@ -174,8 +174,8 @@ class CouplingStiffness(Prepared[CouplingStiffnessParameters]):
             yield Publish(
                 Warned(
                     f"{name}: k2 differs from its value for the bare frame by {spring.k2_apart:+.1f} standard "
-                    "uncertainties: check whether the block, its clamp or the spring touches the second storey, or "
-                    "the clamp yields under the spring",
+                    "uncertainties: check whether the block, its clamp or the spring touches the second storey, and "
+                    "whether the clamp yields under the force of the spring",
                 )
             )
         yield Publish(PointFinished(point(held, 0)))
@@ -188,7 +188,7 @@ class CouplingStiffness(Prepared[CouplingStiffnessParameters]):
         pace: Pace,
         point: Callable[[FrameResult, int], SpringPoint] = bare_point,
     ) -> Generator[Step, Outcome, FrameResult]:
-        """Decays of the present frame, with a point for each decay."""
+        """Combined result of the decays of the specimen `name`, with a point published for each decay."""
         pace.elapsed += BY_HAND
         pulse = self._pulses[name]
         decays = yield from pulsed_decays(self.parameters, self.configuration, pulse, setting, pace, name, point)

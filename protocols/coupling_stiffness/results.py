@@ -49,7 +49,9 @@ def springs_table(points: Sequence[SpringPoint]) -> str:
 
 
 def springs_figure(springs: Sequence[SpringResult]) -> "Figure":
-    """Figure that compares the springs, with two rows for each spring: decay and residual. Empty without springs."""
+    """Figure that compares the springs, with two rows for each spring: decay and residual. Without springs, the panels
+    are empty.
+    """
     figure = new_figure(9.0, 3.6 + 3.2 * len(springs))
     grid = figure.add_gridspec(1 + 2 * len(springs), 2, height_ratios=(3.4, *[2.2, 1.0] * len(springs)))
     compared, budget = figure.add_subplot(grid[0, 0]), figure.add_subplot(grid[0, 1])

@@ -101,7 +101,7 @@ def identified_reference(known: Identified | None) -> Reference | None:
 
 
 def frame_change(bare: FrameResult, known: Identified | None) -> str | None:
-    """Significant differences (99 %) of k1 and k2 from the identified frame, as text; None if there are none."""
+    """Text stating the differences of k1 and k2 from the identified frame; None if neither is significant (99 %)."""
     before = identified_reference(known)
     if before is None:
         return None
@@ -129,7 +129,7 @@ def replaces(bare: FrameResult, known: Identified) -> bool:
 
 
 def spring_result(label: float, held: FrameResult, reference: Reference) -> SpringResult:
-    """Stiffness of a spring as the difference between two frames."""
+    """Stiffness of the spring labelled `label`: k1 of the frame `held`, with the spring, minus k1 of `reference`."""
     k1, shared = float(reference.values[0]), held.shared
     shift = held.shared_shift[K1] - reference.shift[0]
     parts = {
@@ -172,7 +172,7 @@ def bare_point(result: FrameResult, number: int) -> SpringPoint:
 
 
 def spring_point(spring: SpringResult, nominal: float, number: int) -> SpringPoint:
-    """Point of a spring; `nominal` [N/m] is the stiffness on its label."""
+    """Point of a spring; `nominal` [N/m] is the stiffness on its label, `number` that of the decay (0: all decays)."""
     return SpringPoint(
         **bare_point(spring.held, number).model_dump(exclude_none=True, exclude={"k_c_parts"}),
         beta=spring.label,
@@ -234,6 +234,6 @@ def _relative(covariance: Array, values: Array) -> Array:
 
 
 def _own_variance(held: FrameResult, place: int) -> float:
-    """Variance of a quantity without the contributions of masses and timebase."""
+    """Variance of the quantity with index `place`, without the contributions of masses and timebase."""
     shift = held.shared_shift[place]
     return float(held.frame.covariance[place, place] - shift @ held.shared @ shift)

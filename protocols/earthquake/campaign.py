@@ -55,7 +55,7 @@ class EarthquakeCampaign(Prepared[EarthquakeParameters]):
 
     @cached_property
     def left_out(self) -> LeftOut:
-        """Combinations that are not played, taken from the data file if there is one."""
+        """Combinations of record and specimen that are not played; in a replay, those stored in the data file."""
         if self._stored is not None:
             return self._stored.left_out
         return beyond_limits(self.combinations, self.configuration)
@@ -110,10 +110,10 @@ class EarthquakeCampaign(Prepared[EarthquakeParameters]):
 
 
 BETA_STEP = 0.05
-"""Step of the stiffness ratio along a curve."""
+"""Step of the stiffness ratio along a predicted curve."""
 
 BETA_MARGIN = 0.15
-"""Extension of a curve beyond the measured stiffnesses."""
+"""Extension of a predicted curve beyond the stiffness ratios of the campaign."""
 
 
 def curves(parameters: EarthquakeParameters, shakings: Sequence[Shaking], specimen: Specimen) -> Curves:
@@ -199,7 +199,8 @@ def _remarks(rows: Sequence[dict[str, Any]]) -> list[str]:
     played = [row for row in rows if row["status"] != "not played"]
     lines = [
         "",
-        f"{agreeing} of {len(compared)} gains agree with the prediction, {toppled} of {len(played)} runs toppled.",
+        f"Gains that agree with the prediction: {agreeing} of {len(compared)}. Runs in which the block toppled: "
+        f"{toppled} of {len(played)}.",
     ]
     for row in rows:
         if row["reason"]:
@@ -238,11 +239,11 @@ def check_statement(points: Sequence[PointLike], band: tuple[float, float]) -> d
 def statement_text(checked: Mapping[str, Any]) -> str:
     """The verdicts as lines of text for the terminal."""
     low, high = checked["band_hz"]
-    lines = [f"Statement of the paper: {checked['statement']}. Records are limited to {low:g} to {high:g} Hz."]
+    lines = [f"Statement of the paper: {checked['statement']}. Band of the records: {low:g} to {high:g} Hz."]
     for name in _SOURCES:
         found = checked[name]
-        best = f"best {_gain_text(found['best'])}: around 0.5 {found['around_half']}"
-        lines.append(f"  {name}: below one {found['below_one']}; {best}; towards one {found['towards_one']}")
+        best = f"best {_gain_text(found['best'])}, around 0.5: {found['around_half']}"
+        lines.append(f"  {name}: below one: {found['below_one']}; {best}; towards one: {found['towards_one']}")
         for record in found["records"]:
             pairs = zip(record["beta"], record["alpha_2"], strict=True)
             gains = ", ".join(f"{beta:g}: {_gain_text(gain)}" for beta, gain in pairs)

@@ -30,10 +30,10 @@ CHUNK = 10
 
 @dataclass(frozen=True)
 class Predicted:
-    """Predicted gains under a pair of motions; NaN where the block topples with the nominal specimen.
+    """Predicted gains under the motions of a bare and a coupled test.
 
-    `alpha_1` and `alpha_2`, shape (n,), are the gains of the draws, NaN where the block topples; `times` [s] are the
-    times of overturning.
+    `nominal` contains alpha_1 and alpha_2 of the nominal specimen, NaN if its block topples. `alpha_1` and `alpha_2`,
+    shape (n,), are the gains of the draws, NaN where the block topples; `times` [s] are the times of overturning.
     """
 
     nominal: tuple[float, float]
@@ -58,7 +58,10 @@ def predict_draws(
     table_scale: float = 0.0,
     noisy: bool = True,
 ) -> Predicted:
-    """Gains of `n` draws of the specimen and of the table motions within their uncertainties."""
+    """Gains of `n` draws of the specimen and of the table motions within their uncertainties.
+
+    `table_scale` is the relative standard uncertainty of the motions' common scale; their noise is drawn if `noisy`.
+    """
     import_module("sim.kernel.rocking")  # compiled once, before the threads start
     root = seed if isinstance(seed, SeedSequence) else SeedSequence(seed)
     specimens, scale, *seeds = root.spawn(2 + n)

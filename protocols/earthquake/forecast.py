@@ -41,7 +41,9 @@ TOLERANCE = 1e-7
 
 
 def travel(specimen: Specimen, shaking: Shaking, factor: float, grounded: bool) -> Travel:
-    """Simulate the specimen from rest under `factor` times the record, until the record ends or the block falls."""
+    """Largest motions of the specimen, simulated from rest under `factor` times the record until the record ends or the
+    block falls.
+    """
     record = shaking.prepared.record
     times = np.arange(0.0, record.duration, STEP)
     motion = simulate(
@@ -99,10 +101,14 @@ DRAWS, SEED = 32, 8
 """Number of specimens drawn in addition to the nominal one, and random seed."""
 
 OFF = 0.03
-"""Relative error of the table's motion, and allowance for noise and friction in the demands on table and shaker."""
+"""Largest relative error of the table's motion; also the relative allowance for noise and friction in the demands on
+table and shaker.
+"""
 
 IMPACTS = 0.15
-"""Allowance for quantities increased by the impacts of a rocking block, which the drive does not compensate."""
+"""Relative allowance for the impacts of a rocking block, which increase some demands and which the drive does not
+compensate.
+"""
 
 OFF_MIDDLE = 0.015
 """Largest offset of a storey at rest from the middle of the laser's range, relative to half the range."""

@@ -5,7 +5,7 @@ from protocols.common.replicate import TableMotion
 
 
 def seismic_view(run: LiveRun) -> LiveView:
-    """Gain over the stiffness for each record; acceleration of the table in the last play, and of the record."""
+    """Gain against the stiffness ratio for each record; acceleration of the table in the last play, with the record."""
     motions = run.events(TableMotion)
     panel = Panel(
         "record and achieved motion",

@@ -20,15 +20,18 @@ from sim.specimen import Specimen
 Array = NDArray[np.float64]
 
 QUIET = 0.5
-"""Fraction of the rest before a record that is used to determine the noise; the filters ring in the remainder."""
+"""Fraction of the rest before a record that is used to determine the noise; in the remainder, the zero-phase filters
+of the record already ring.
+"""
 
 
 @dataclass(frozen=True)
 class PeakSeen:
-    """A peak, and the sensor signals at its time; `lasers` and `table` are positive in the direction of the peak.
+    """A peak, and the sensor signals at its time.
 
-    `lasers` [m] are the readings of the lasers, `speeds` [m/s] the rates of change of their signals, `swings` [m] the
-    signals' ranges within the fit window; `table` [m] is the table's displacement.
+    `lasers` [m] are the readings of the lasers and `table` [m] the table's displacement, both positive in the direction
+    of the peak; `speeds` [m/s] are the rates of change of the lasers' signals, and `swings` [m] the ranges of these
+    signals within the fit window.
     """
 
     peak: TransientPeak
@@ -66,7 +69,7 @@ def _sensor_peak(signals: Array, still: Array, column: int, sample_rate: float) 
     peak = transient_peak(values, quiet[np.isfinite(quiet)], sample_rate)
     place, half = round(peak.time * sample_rate), max(round(peak.window * sample_rate), 2)
     window = signals[max(place - half, 0) : place + half + 1]
-    # values and rates are fitted over the window, to be insensitive to single samples
+    # values and rates come from a fit over the window, which is insensitive to single samples
     time = (np.arange(len(window)) - min(place, half)) / sample_rate
     lines = [_line(time, window[:, each]) for each in (LASER_1, LASER_2, DISPLACEMENT)]
     (first, v1), (second, v2), (table, _) = lines
@@ -160,7 +163,8 @@ STEP = 0.01
 """Time step of a predicted history [s]."""
 
 AUDIBLE = 20.0
-"""Minimum running peak of the bare drift, in standard uncertainties of that peak, at which a ratio is published."""
+"""Running peak of the bare drift, in standard uncertainties of the final peak, above which a running gain is published.
+"""
 
 
 @dataclass(frozen=True, eq=False)

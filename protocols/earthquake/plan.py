@@ -52,7 +52,7 @@ SEED = 5
 
 
 BETWEEN = 45.0
-"""Typical time between records in which the storeys come to rest [s]."""
+"""Typical time between records, in which the storeys come to rest [s]."""
 
 
 class Pace:
@@ -164,7 +164,7 @@ class EarthquakePlan:
         try:
             observed = observe(outcome.signals, shaking.target.rest, rate)
         except InvalidInput as lost:
-            yield Publish(Warned(f"{shaking.name}, bare frame, has no measurable peak: {lost}"))
+            yield Publish(Warned(f"{shaking.name} has no measurable peak with the bare frame: {lost}"))
             return f"the bare frame has no measurable peak: {lost}"
         self._histories.bare(shaking, outcome.signals, History.of(self._specimen.bare(), observed.base).drift)
         return BareTest(
@@ -243,7 +243,7 @@ class EarthquakePlan:
         raise RigError("playing a drive returned no result")
 
     def _running_gain(self, shaking: Shaking, specimen: Specimen, bare: BareTest) -> GainMonitor:
-        """Monitor of the running gain; the prediction is for the motion that this drive caused with the bare frame."""
+        """Monitor of the running gain; its prediction is for the table motion achieved with the bare frame."""
         base = bare.observed.base
         expected = (History.of(specimen.bare(), base), History.of(specimen, base))
         noise = bare.observed.drift.peak.uncertainty
@@ -263,7 +263,7 @@ class EarthquakePlan:
 def table_model(
     source: TableSource, configuration: BenchConfiguration, pace: Pace
 ) -> Generator[Step, Outcome, TableModel]:
-    """The stored table model, or one identified now; in both cases the bare frame is mounted."""
+    """The stored table model, or a newly identified one; in both cases the bare frame is mounted first."""
     if source.model is not None or source.plan is None:
         assert source.model is not None
         bare = configuration.known_specimen.bare()

@@ -1,4 +1,4 @@
-"""Points of a record: measured, overturned, or not played."""
+"""Points for the outcomes of a record: measured, overturned, or not played."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -36,7 +36,7 @@ class BareTest:
 
 
 def shared_fields(shaking: Shaking, beta: float, target_gain: float | None, bare: BareTest | None) -> dict[str, object]:
-    """Fields of every point, independent of the outcome."""
+    """Fields that a point has for every outcome."""
     return {
         "record": shaking.name,
         "beta": beta,
@@ -110,7 +110,7 @@ def overturned_point(
     draws: int,
     seed: int,
 ) -> EarthquakePoint:
-    """Point of a record that toppled the block; the prediction is for the full motion with the bare frame."""
+    """Point of a record that toppled the block; the prediction is for the table motion of the test without block."""
     time = overturning_time(signals, shaking.target.sample_rate, specimen)
     base = bare.observed.base
     scale = configuration.sensors.table_scale
@@ -168,7 +168,7 @@ def rejection(learned: Replicated, parameters: EarthquakeParameters) -> str | No
     if learned.repeatable <= parameters.usable:
         return None
     return (
-        f"after {len(learned.passes)} passes the table's motion has an error of {learned.repeatable:.1%} rms, more than"
+        f"the table's motion has an error of {learned.repeatable:.1%} rms (passes: {len(learned.passes)}), more than"
         f" {parameters.usable:.1%} (--usable); {learned.reason}"
     )
 

@@ -53,7 +53,7 @@ class EarthquakeParameters(Parameters):
         le=3600,
     )
     passes: int = quantity(
-        5, "1", "maximum number of passes of the replication of a record, with the bare frame", ge=1, le=20
+        5, "1", "maximum number of replication passes for a record, with the bare frame", ge=1, le=20
     )
     tolerance: float = quantity(
         0.005,
@@ -74,7 +74,7 @@ class EarthquakeParameters(Parameters):
         0.05,
         "1",
         "largest rms error, excluding noise, relative to the record's rms, at which the best drive is still used "
-        "if the passes end before the tolerances are met, because of a limit, the number of passes, or missing "
+        "if the passes end before the tolerances are met because of a limit, the maximum number of passes, or missing "
         "samples",
         gt=0,
         lt=1,
@@ -84,7 +84,7 @@ class EarthquakeParameters(Parameters):
     draws: int = quantity(
         200,
         "1",
-        "number of Monte Carlo draws for each prediction; half as many for the bench alone, a quarter for "
+        "number of Monte Carlo draws for each prediction; half as many for an exactly known specimen, a quarter for "
         "each contribution",
         ge=40,
         le=5000,
@@ -111,18 +111,18 @@ class EarthquakePoint(Parameters):
     status: PointStatus = quantity(..., "", "outcome of the record")
     alpha_1: float | None = quantity(None, "1", "measured gain of the peak of u1, coupled over bare")
     alpha_1_uncertainty: float | None = quantity(None, "1", "expanded uncertainty of alpha_1 (k = 2)")
-    alpha_1_predicted: float | None = quantity(None, "1", "predicted gain of u1 for the achieved table motions")
+    alpha_1_predicted: float | None = quantity(None, "1", "predicted gain of u1's peak for the achieved table motions")
     alpha_1_low: float | None = quantity(
         None, "1", "lower bound of the 95 % interval expected for the measured alpha_1"
     )
     alpha_1_high: float | None = quantity(
         None, "1", "upper bound of the 95 % interval expected for the measured alpha_1"
     )
-    alpha_1_agrees: bool | None = quantity(None, "1", "whether alpha_1 lies between alpha_1_low and alpha_1_high")
+    alpha_1_agrees: bool | None = quantity(None, "1", "whether alpha_1 is between alpha_1_low and alpha_1_high")
     alpha_2: float | None = quantity(None, "1", "measured gain of the peak drift, coupled over bare")
     alpha_2_uncertainty: float | None = quantity(None, "1", "expanded uncertainty of alpha_2 (k = 2)")
     alpha_2_predicted: float | None = quantity(
-        None, "1", "predicted gain for the achieved table motions and the known specimen"
+        None, "1", "predicted gain of the peak drift for the achieved table motions"
     )
     alpha_2_low: float | None = quantity(
         None, "1", "lower bound of the 95 % interval expected for the measured alpha_2, by Monte Carlo simulation"
@@ -131,7 +131,9 @@ class EarthquakePoint(Parameters):
         None, "1", "upper bound of the 95 % interval expected for the measured alpha_2"
     )
     alpha_2_target: float | None = quantity(
-        None, "1", "predicted gain for the commanded table motion; absent if the block would topple"
+        None,
+        "1",
+        "predicted gain of the peak drift for the target motion; absent if the block would topple",
     )
     alpha_2_bench_uncertainty: float | None = quantity(
         None,
@@ -139,14 +141,14 @@ class EarthquakePoint(Parameters):
         "half width of the 95 % interval of measured minus predicted alpha_2 for an exactly known specimen, "
         "by Monte Carlo simulation",
     )
-    agrees: bool | None = quantity(None, "1", "whether alpha_2 lies between alpha_2_low and alpha_2_high")
-    dominating: str = quantity("", "", "largest contribution to the uncertainty")
+    agrees: bool | None = quantity(None, "1", "whether alpha_2 is between alpha_2_low and alpha_2_high")
+    dominating: str = quantity("", "", "name of the largest contribution to the uncertainty of alpha_2")
     uncertainty_parts: str = quantity("", "", "standard uncertainty of alpha_2 by contribution, as JSON")
     topple_chance: float | None = quantity(
         None, "1", "predicted probability that the block topples, given the uncertainty of specimen and motion"
     )
     overturned_s: float | None = quantity(
-        None, "s", "time at which the block finally passed its critical angle, to about 0.3 s"
+        None, "s", "time at which the block finally passed its critical angle, accurate to about 0.3 s"
     )
     overturned_predicted_s: float | None = quantity(
         None,
@@ -172,7 +174,9 @@ class EarthquakePoint(Parameters):
         "1",
         "rms difference between the table motions with the coupled and the bare frame, relative to the record's rms",
     )
-    bare_tracking_error: float | None = quantity(None, "1", "rms error of the table with the bare frame")
+    bare_tracking_error: float | None = quantity(
+        None, "1", "rms error of the table within the band, relative to the record's rms, bare frame"
+    )
     passes: int = quantity(0, "1", "number of passes of the replication with the bare frame")
     replication: str = quantity("", "", "outcome of the replication")
     reason: str = quantity("", "", "remarks, or the reason why the gain is absent")

@@ -64,7 +64,7 @@ class FileSources:
 
     @staticmethod
     def stored(tables: Mapping[str, Table]) -> "FileSources | None":
-        """Sources in a data file; None for files of older versions, which lack them."""
+        """Sources stored in a data file; None for files of older versions, which do not contain them."""
         if RECORDS not in tables or SAMPLES not in tables:
             return None
         return FileSources(_stored_records(tables), _stored_model(tables), _stored_left_out(tables))
@@ -199,7 +199,7 @@ class Shaking:
 
 
 def band_used(parameters: EarthquakeParameters, configuration: BenchConfiguration) -> tuple[float, float]:
-    """Band [Hz] to which records are filtered. Raises InvalidInput for a band beyond the table's."""
+    """Band [Hz] to which records are filtered. Raises InvalidInput if there is none or it exceeds the table's band."""
     low, high = configuration.table_band
     band = band_of(parameters.table_band, configuration)
     if band is None:
@@ -208,7 +208,7 @@ def band_used(parameters: EarthquakeParameters, configuration: BenchConfiguratio
         )
     if band[0] < low or band[1] > high:
         raise InvalidInput(
-            "--table-band", parameters.table_band, f"it must lie within the table's band, {low:g} to {high:g} Hz"
+            "--table-band", parameters.table_band, f"it must be within the table's band, {low:g} to {high:g} Hz"
         )
     return band
 
@@ -216,8 +216,8 @@ def band_used(parameters: EarthquakeParameters, configuration: BenchConfiguratio
 def shakings(
     parameters: EarthquakeParameters, configuration: BenchConfiguration, sources: FileSources | None = None
 ) -> tuple[Shaking, ...]:
-    """Read and prepare every record, in the given order, or take them from `sources`, those stored in a data file.
-    Raises InvalidInput for a record that cannot be read or is unsuitable for the bench.
+    """Read and prepare every record, in the given order; `sources` are those stored in a data file, which replace the
+    files of the records. Raises InvalidInput for a record that cannot be read or is unsuitable for the bench.
     """
     named = parameters.records or tuple(f"synthetic:{name}" for name in NAMES)
     records = sources.records if sources else read_records([RecordReference.parse(text) for text in named])

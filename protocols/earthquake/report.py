@@ -33,8 +33,8 @@ def seismic_sections(campaign: Campaign) -> list[Section]:
     compared = [row["agrees"] for row in points if row["agrees"] is not None]
     toppled = sum(row["status"] == "overturned" for row in points)
     parts: list[Part] = [
-        f"{counted(len(points), 'test')}; {sum(compared)} of {len(compared)} measured gains lie within the "
-        "prediction interval for the achieved motion of the table, and the block toppled in "
+        f"{counted(len(points), 'test')}; {sum(compared)} of {len(compared)} measured gains are within the "
+        "prediction interval for the achieved motion of the table; tests in which the block toppled: "
         f"{toppled or 'none'}. Uncertainties of measured gains are expanded (k = 2); the interval is the 95 % "
         "interval of the measured value, from a Monte Carlo simulation over specimen and sensors.",
         _gains(points),
@@ -174,7 +174,7 @@ def _conditions(points: Sequence[Mapping[str, Any]]) -> Table:
 
 
 def _statement(campaign: Campaign, points: Sequence[Mapping[str, Any]]) -> list[Part]:
-    """The paper's statement for the band of the campaign, with the verdicts by model and measurement."""
+    """Table of the verdicts on the paper's statement, for measured and predicted gains in the band of the campaign."""
     if campaign.configuration is None:
         return []
     parameters = validated(EarthquakeParameters, campaign.parameters)
@@ -198,12 +198,15 @@ def _statement(campaign: Campaign, points: Sequence[Mapping[str, Any]]) -> list[
 Floats = NDArray[np.float64]
 
 QUIET = 1.5
-"""Time at the start of a run in which the signals are zeroed [s]; by default, the table is at rest for 2 s."""
+"""Time at the start of a run from which the zero of the signals is taken [s]; by default, the table is at rest for 2 s.
+"""
 
 
 @dataclass(frozen=True)
 class Played:
-    """Played record: file rows from the start of its drive to its last gain; `run` is the first row of its run."""
+    """Played record: file rows `start` to `stop`, from the start of its drive to its last running gain; `run` is the
+    first row of its run.
+    """
 
     name: str
     beta: float | None
@@ -231,7 +234,7 @@ def played_records(record: DataFile) -> list[Played]:
         one = Played(str(name), None if beta is None else float(beta), begin, stop - samples, stop)
         # all gains of a played record are relative to the same start
         if found and (found[-1].run, found[-1].name, found[-1].beta) == (one.run, one.name, one.beta):
-            # the first gain is at the end of a block, from which the start follows; the last one may lie within a block
+            # the first gain is at the end of a block, which determines the start; the last gain may be within a block
             start = found.pop().start
             one = replace(one, start=start, stop=start + samples)
         found.append(one)
@@ -239,7 +242,7 @@ def played_records(record: DataFile) -> list[Played]:
 
 
 def signals_of(record: DataFile, signals: SignalMap, played: Played) -> Floats:
-    """Signals of a played record, shape (n, n_signals), relative to the zero at rest."""
+    """Signals of a played record, shape (n, n_signals), relative to their values at rest."""
 
     def values(start: int, stop: int) -> Floats:
         return np.column_stack([record.values(channel.name, slice(start, stop)) for channel in record.channels])
@@ -321,7 +324,7 @@ def _bare_and_softest(plays: Sequence[Played]) -> list[Played]:
 
 
 def _predicted_drift(campaign: Campaign, shaking: Shaking, play: Played, shown: Floats) -> Floats:
-    """Predicted drift [m] every STEP under the measured table motion; empty if samples of it are missing."""
+    """Predicted drift [m] every `STEP` seconds under the measured table motion; empty if it cannot be evaluated."""
     specimen = campaign.specimen.bare() if play.beta is None else campaign.specimen.coupled(play.beta)
     try:
         base = observe(shown, shaking.target.rest, campaign.record.sample_rate).base

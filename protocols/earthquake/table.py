@@ -16,7 +16,7 @@ from protocols.earthquake.records import FileSources, band_used
 from sim.errors import InvalidInput
 
 PERIOD, LONGEST = 8.0, 120.0
-"""Usual and longest period of the identification [s]; a low band requires more than the usual one."""
+"""Usual and longest period of the identification [s]; a low band requires a longer period than the usual one."""
 
 OCTAVE_LINES = 4
 """Minimum number of lines in the lowest octave of the identification, which has the fewest lines."""
@@ -49,7 +49,7 @@ def stored_table(
 
 @dataclass(frozen=True, eq=False)
 class TableSource:
-    """Source of the table model: a stored `model`, or an identification with `parameters` according to `plan`."""
+    """Source of the table model: a stored `model`, or else an identification with `parameters`, planned as `plan`."""
 
     model: TableModel | None
     parameters: IdentifyParameters
@@ -83,7 +83,7 @@ def table_warnings(
     if model is not None and model.specimen != bare:
         said.append(
             f"table_model was identified with {model.specimen!r} on the table, but the drives are iterated with the "
-            f"{bare}: more passes may be needed; `rockbench run identify` without --beta identifies the table for it"
+            f"{bare}: more passes may be needed; `rockbench run identify` without --beta uses the bare frame"
         )
     mode, low = (
         min(configuration.known_specimen.frame.natural_frequencies) / tau,

@@ -30,7 +30,7 @@ Array = NDArray[np.float64]
 INTERVAL = (0.025, 0.975)
 
 HELD = 0.95
-"""Coverage of an expanded uncertainty."""
+"""Coverage probability of an expanded uncertainty."""
 
 CHAOTIC = 2.0
 """Ratio of the summed variances of single contributions to the variance of a joint draw above which they are considered
@@ -45,7 +45,7 @@ _KEPT = {
     "stiffness of the spring": ("spring",),
     "restitution of the block": ("restitution",),
 }
-"""Contributions of the specimen's uncertainty, and the knowledge fields that define them."""
+"""Contributions of the specimen's uncertainty, and the fields of `SpecimenKnowledge` that define them."""
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ class Compared:
 def compare(
     bare: Observed, coupled: Observed, specimen: Specimen, configuration: BenchConfiguration, n: int, seed: int
 ) -> Compared:
-    """Compare the gain measured in two tests, bare and coupled, with the predicted gain."""
+    """Compare the gains measured in two tests, bare and coupled, with the predicted gains of `n` draws."""
     sensors = configuration.sensors
     drifts, firsts = (bare.drift, coupled.drift), (bare.u1, coupled.u1)
     of_drift, of_u1, of_all, of_bench, of_parts = SeedSequence(seed).spawn(5)
@@ -139,7 +139,7 @@ def _parts(
     table_scale: float,
     seed: SeedSequence,
 ) -> dict[str, float]:
-    """Standard deviation of the predicted alpha_2 due to each single contribution to the model's inputs."""
+    """Standard deviation of the predicted alpha_2 due to each contribution alone: motion, table scale, specimen."""
     of_noise, of_scale, *streams = seed.spawn(2 + len(_KEPT))
     runs = {
         "noise of the table's motion": predicted(NONE, n, 0.0, True, of_noise),
@@ -151,7 +151,7 @@ def _parts(
 
 
 def _ratio(errors: Array) -> Array:
-    """Relative error of the ratio of coupled to bare, as a factor, from the relative errors of both, shape (2, n)."""
+    """Factor by which the relative errors of bare and coupled peaks, shape (2, n), change their ratio; shape (n,)."""
     return (1.0 + errors[1]) / (1.0 + errors[0])
 
 

@@ -33,7 +33,7 @@ def rocking_point(
     push: float | None = None,
     remarks: str = "",
 ) -> RockingPoint:
-    """Point of `part`, the name of a tilt or of all tilts, for the block of `specimen`."""
+    """Point of `part`, one tilt or all tilts, for the block of `specimen`; `residual` [m] is the rms of the fit."""
     block, theory = specimen.block, theoretical_restitution(specimen.block)
     r, birge = found.restitution, found.motion.birge
     return RockingPoint(
@@ -75,8 +75,8 @@ def inconsistencies(combined: RockingPoint) -> list[str]:
     found: list[str] = []
     if abs(combined.trend) > combined.trend_uncertainty:
         found.append(
-            f"r changes with the impact velocity by {combined.trend:+.2g} +- {combined.trend_uncertainty:.2g} over the"
-            " whole range: the stated value is the mean over these tilts"
+            f"r changes by {combined.trend:+.2g} +- {combined.trend_uncertainty:.2g} over the whole range of impact"
+            " velocities: the stated value is the mean over these tilts"
         )
     motion, motion_uncertainty = combined.r_motion or combined.r_exp, combined.r_motion_uncertainty or 0.0
     apart = motion - combined.r_amplitudes
@@ -86,9 +86,9 @@ def inconsistencies(combined: RockingPoint) -> list[str]:
         )
     if combined.birge is not None and combined.birge > SCATTERED:
         found.append(
-            f"the scatter of the tilts is {combined.birge:.1f} times that expected from their uncertainties, and "
-            "is included: the impacts differ. r_exp is taken from the amplitudes, which are less sensitive to "
-            "these differences"
+            f"the scatter of the tilts is {combined.birge:.1f} times that expected from their uncertainties, and is "
+            "included in the uncertainty: the impacts differ. r_exp is taken from the amplitudes, which are less "
+            "sensitive to these differences"
         )
     if combined.birge is None:
         found.append("a single tilt does not show the scatter of r between tilts: release the block several times")
@@ -108,9 +108,9 @@ def inconsistencies(combined: RockingPoint) -> list[str]:
     ):
         if abs(seen - sides) > uncertainty:
             found.append(
-                f"{name} is {seen:.5g} from the motion and {sides:.5g} from the sides, a difference of "
-                f"{100 * (seen / sides - 1):+.2g} %: check for blunt edges, the laser's height and scale, the sides "
-                "and the density"
+                f"{name} is {seen:.5g} from the motion and {sides:.5g} from the dimensions, a difference of "
+                f"{100 * (seen / sides - 1):+.2g} %: check for blunt edges, the laser's height and scale, the "
+                "dimensions, and whether the block is uniform"
             )
     return found
 
@@ -127,8 +127,8 @@ def fit_events(tilt: Tilt, alone: Findings, uncertain: Array, number: int) -> It
 def identified_specimen(found: Findings, tilts: int, block: Block, known: Identified | None) -> Identified:
     """Identified specimen with the restitution factor of `block`, the ratio of measured to theoretical restitution.
 
-    The theoretical value depends on the block's sides, so the source of the finding states both the sides and the
-    measured restitution.
+    The theoretical value depends on the block's width 2b and height 2h_b, so the source of the finding states both and
+    the measured restitution.
     """
     theory, r = theoretical_restitution(block), found.restitution
     by = "amplitudes of the swings" if found.by_amplitudes else "exact motion"
@@ -137,7 +137,7 @@ def identified_specimen(found: Findings, tilts: int, block: Block, known: Identi
         name="restitution_factor",
         value=r.value / theory,
         standard_uncertainty=r.uncertainty / theory,
-        source=f"free rocking, {tilts} tilts, from the {by}: r_exp = {r.value:.6f} of a block of {sides}",
+        source=f"free rocking (tilts: {tilts}), from the {by}: r_exp = {r.value:.6f} of a block of {sides}",
         date=datetime.now(UTC).replace(microsecond=0),
     )
     return (known or Identified()).extended([finding])
@@ -187,7 +187,7 @@ def _impacts(tilt: Tilt, alone: Findings, number: int) -> FitFinished:
 
 
 def _by_sides(value: Callable[[Block], float], block: Block, parameters: FreeRockingParameters) -> float:
-    """Standard uncertainty of a quantity computed from the measured width and height, which are uncorrelated."""
+    """Standard uncertainty of a quantity computed from the measured width and height, whose errors are independent."""
     half = 0.5 * parameters.side_uncertainty
     wider = Block.model_validate(block.model_dump() | {"b": block.b + half})
     higher = Block.model_validate(block.model_dump() | {"h_b": block.h_b + half})

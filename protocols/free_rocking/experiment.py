@@ -50,7 +50,7 @@ class FreeRockingTest(Prepared[FreeRockingParameters]):
 
     @cached_property
     def forecast(self) -> Forecast:
-        """Duration and demands: the range of laser 2 is used, and there is no drive."""
+        """Duration and demands: only the range of laser 2 is used; the drive remains zero."""
         self.progress("predicting the demands of the run")
         largest = max(abs(tilt.displacement) for tilt in self.tilts)
         where = f"{1e3 * largest:.0f} mm of displacement of the block's face"
@@ -115,7 +115,7 @@ class FreeRockingTest(Prepared[FreeRockingParameters]):
         )
 
     def _check(self) -> None:
-        """Raise InvalidInput if the laser cannot measure the block's motion."""
+        """Raise InvalidInput if the laser cannot measure the block's motion, or the simulated filters are too slow."""
         p, configuration = self.parameters, self.configuration
         low, high = beam_heights(self.tilts, configuration.specimen)
         for tilt in self.tilts:
@@ -125,7 +125,7 @@ class FreeRockingTest(Prepared[FreeRockingParameters]):
             allowed = configuration.limits.laser_range
             if share > allowed:
                 needs = (
-                    f"the face moves by {1e3 * abs(tilt.displacement):.1f} mm at this height, {share:.2f} of "
+                    f"the face moves by {1e3 * abs(tilt.displacement):.1f} mm at this height, {share:.2f} times "
                     "half the range"
                 )
                 raise InvalidInput(

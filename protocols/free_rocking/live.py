@@ -7,11 +7,11 @@ from bench.live_view import LiveRun, LiveView, Panel
 from sim.free_rocking import theoretical_restitution
 
 IMPACTS = "restitution"
-"""Series that a fit of the impacts has and a fit of the motion does not."""
+"""Series contained in a fit of the impacts, but not in a fit of the motion."""
 
 
 def rocking_view(run: LiveRun) -> LiveView:
-    """Restitution of every impact of each tilt, with its expanded uncertainty, and the motion of the last tilt."""
+    """Restitution of every impact of each tilt, with its expanded uncertainty, and the last tilt's fitted motion."""
     theory = theoretical_restitution(run.configuration.known_specimen.block)
     restitution = Panel(
         "restitution by impact",

@@ -1,4 +1,4 @@
-"""Steps of a free-rocking run. The drive is zero throughout.
+"""Steps of a free-rocking run. The drive remains zero.
 
 1. The table is locked, since a moving table absorbs part of an impact. Laser 2 is aimed at the block.
 2. For each tilt, the operator holds the block and releases it during the recording; a recording without free rocking
@@ -49,19 +49,19 @@ UNLOCK = "Remove the clamps from the table."
 BACK = "Aim laser 2 at storey 2 again."
 
 REST = 1.0
-"""Time at the start in which the operator holds the block and the signals are zeroed [s]."""
+"""Time before a recording during which the operator holds the block and the signals are zeroed [s]."""
 
 _OVERHEAD = 20.0
-"""Time for a tilt in addition to its recording [s], in which the operator tilts the block and starts the recording."""
+"""Time in which the operator tilts the block and starts the recording [s]."""
 
 _LEAST_LOSS = 0.8
-"""Smallest velocity loss per impact, relative to the theoretical loss, for which the recording is long enough."""
+"""Smallest velocity loss per impact, relative to the theoretical loss, for which the recording is planned."""
 
 
 @dataclass(frozen=True)
 class PlannedTilt:
-    """A tilt by `angle` [rad], positive towards the frame, recorded for `recording` [s]. `displacement` [m] is the
-    displacement of the face at the laser beam, NaN if the beam misses the face.
+    """A planned tilt by `angle` [rad], positive towards the frame, recorded for `recording` [s]. `displacement` [m] is
+    that of the block's face at the laser beam, NaN if the beam misses the face.
     """
 
     angle: float
@@ -75,7 +75,7 @@ class PlannedTilt:
 
     @property
     def duration(self) -> float:
-        """Expected time for the complete tilt, if one recording suffices [s]."""
+        """Expected time for the complete tilt [s], if one recording suffices."""
         return self.recording + REST + _OVERHEAD
 
 
@@ -89,7 +89,7 @@ def planned_tilts(parameters: FreeRockingParameters, specimen: Specimen) -> tupl
 
 
 def beam_heights(tilts: Sequence[PlannedTilt], specimen: Specimen) -> tuple[float, float]:
-    """Lowest and greatest height [m] at which the beam hits the face at every tilt."""
+    """Lowest and highest height of the beam above the table [m] at which it hits the face at every tilt."""
     faces = [block_face.heights(tilt.angle, specimen.block) for tilt in tilts]
     return max(float(low) for low, _ in faces), min(float(high) for _, high in faces)
 
@@ -107,7 +107,7 @@ def _planned(parameters: FreeRockingParameters, specimen: Specimen, angle: float
 
 
 class RockingRun:
-    """Steps of a run, its findings so far, and the states of table and laser."""
+    """Steps of a run, its findings so far, and whether the table is locked and laser 2 aimed at the block."""
 
     def __init__(
         self, parameters: FreeRockingParameters, configuration: BenchConfiguration, tilts: Sequence[PlannedTilt]
@@ -152,7 +152,7 @@ class RockingRun:
         )
 
     def _tilt(self, number: int, tilt: PlannedTilt) -> Generator[Step, Outcome, None]:
-        """Record a tilt until a recording is usable or no attempt is left."""
+        """Record a tilt until a recording is usable or the number of attempts is reached."""
         request = self._request(number, tilt)
         for attempt in range(self._parameters.attempts):
             yield Publish(StepStarted(f"tilt {number}: {degrees(tilt.angle):+.1f} degrees, block held and released"))
@@ -207,8 +207,8 @@ class RockingRun:
         found = analyse_tilt(seen, self._specimen, p.least_swing * abs(angle))
         if found.swings.held * angle < 0.0:
             raise NotRocking(
-                f"the laser measures {found.swings.held:+.3f} rad, but {angle:+.3f} rad is requested: tilt the "
-                "block to the other side, or check hardware.laser_2.polarity: displacements towards the frame are "
+                f"the laser measures a tilt of {found.swings.held:+.3f} rad, but {angle:+.3f} rad is requested: tilt "
+                "the block to the other side, or check hardware.laser_2.polarity: displacements towards the frame are "
                 "positive"
             )
         return found
@@ -222,14 +222,14 @@ class RockingRun:
         remarks = ""
         if abs(tilt.push) > PUSH:
             change = f"{100.0 * tilt.push:+.0f} %"
-            remarks = f"the block was not released from rest, which is equivalent to a change of the tilt by {change}"
+            remarks = f"the block was not released from rest; the effect equals a change of the tilt by {change}"
             yield Publish(Warned(f"tilt {number}: {remarks}; the impacts are still used"))
         held, residual, name = tilt.swings.held, tilt.fit.rms, f"tilt {number}"
         point = rocking_point(name, alone, self._specimen, p, residual, tilt=held, push=tilt.push, remarks=remarks)
         yield Publish(PointFinished(point))
 
     def _combine(self) -> Generator[Step, Outcome, None]:
-        """Publish the point of all tilts and the identified specimen."""
+        """Publish the combined point of all tilts and the identified specimen."""
         self.findings = found = self._findings(self.tilts)
         residual = float(np.sqrt(np.mean([tilt.fit.rms**2 for tilt in self.tilts])))
         point = rocking_point(ALL, found, self._specimen, self._parameters, residual)
@@ -247,7 +247,5 @@ class RockingRun:
 
     @property
     def _laser(self) -> LaserErrors:
-        """Laser errors from the data sheet, since a calibration is valid only for displacements of the storeys from
-        rest.
-        """
+        """Errors of laser 2 from the data sheet; a calibration applies only to storey displacements from rest."""
         return LaserErrors(self._configuration.sensors.accuracy, self._configuration.laser_ranges[1])

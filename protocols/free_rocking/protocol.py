@@ -8,7 +8,7 @@ from bench.protocol import Protocol, RunView, deferred
 from sim.parameters import Parameters, each_once, quantity
 
 ALL = "all tilts"
-"""Name of the row that combines all tilts."""
+"""`part` of the point that combines all tilts."""
 
 _EXPANDED = "expanded uncertainty (k = 2)"
 
@@ -19,7 +19,7 @@ class FreeRockingParameters(Parameters):
     """The stand-alone block on a locked table is repeatedly tilted and released by hand; a laser measures its face."""
 
     tilts: tuple[Share, ...] = quantity(
-        (0.35, 0.45, 0.6), "1", "tilts relative to the angle beyond which the block falls", min_length=1
+        (0.35, 0.45, 0.6), "1", "tilts relative to the critical angle, beyond which the block falls", min_length=1
     )
 
     _each_once = field_validator("tilts")(each_once)
@@ -27,7 +27,7 @@ class FreeRockingParameters(Parameters):
     sides: Literal["both", "towards", "away"] = quantity(
         "both",
         "",
-        "direction in which the top of the block is tilted: towards the frame, away from it, or alternating",
+        "directions in which the top of the block is tilted: towards the frame, away from it, or both in turn",
     )
     height: float = quantity(0.30, "m", "height above the table at which laser 2 measures the block", gt=0)
     height_uncertainty: float = quantity(0.001, "m", "standard uncertainty of the height", ge=0)
@@ -42,7 +42,7 @@ class FreeRockingParameters(Parameters):
 
 
 class RockingPoint(Parameters):
-    """Restitution and shape of the block, from its motion and from its sides."""
+    """Restitution and shape of the block, from its motion and from its dimensions."""
 
     part: str = quantity(..., "", "name of the tilt, or of all tilts")
     tilt_rad: float | None = quantity(None, "rad", "tilt before the release, positive towards the frame")
@@ -52,25 +52,25 @@ class RockingPoint(Parameters):
     estimator: str = quantity(
         "", "", "estimator that gives r_exp: the exact motion, or the amplitudes if the impacts differ too much"
     )
-    r_th: float = quantity(..., "1", "theoretical restitution of the block as measured, 1 - 2 M b^2 / J")
-    r_th_uncertainty: float = quantity(..., "1", f"{_EXPANDED} of r_th, due to the block's sides")
+    r_th: float = quantity(..., "1", "theoretical restitution of a block of the configured dimensions, 1 - 2 M b^2 / J")
+    r_th_uncertainty: float = quantity(..., "1", f"{_EXPANDED} of r_th, due to the block's dimensions")
     ratio: float = quantity(..., "1", "r_exp / r_th, the restitution factor of the configured block")
     ratio_uncertainty: float = quantity(..., "1", f"{_EXPANDED} of the ratio, excluding the uncertainty of r_th")
     r_motion: float | None = quantity(None, "1", "restitution from the fit of the exact nonlinear motion")
     r_motion_uncertainty: float | None = quantity(None, "1", f"{_EXPANDED} of r_motion")
-    r_amplitudes: float = quantity(..., "1", "restitution from the amplitudes of the swings alone")
+    r_amplitudes: float = quantity(..., "1", "restitution from the swing amplitudes before and after each impact")
     r_amplitudes_uncertainty: float = quantity(..., "1", f"{_EXPANDED} of r_amplitudes")
     trend: float = quantity(
         ..., "1", "change of r between zero impact velocity and the velocity of a fall from the critical angle"
     )
     trend_uncertainty: float = quantity(..., "1", f"{_EXPANDED} of the trend")
-    alpha_rad: float = quantity(..., "rad", "critical angle from the motion")
+    alpha_rad: float = quantity(..., "rad", "critical angle from the fit of the motion")
     alpha_uncertainty_rad: float = quantity(..., "rad", f"{_EXPANDED} of alpha_rad, mainly from the laser's scale")
-    alpha_sides_rad: float = quantity(..., "rad", "critical angle from the block's sides, atan(b / h_b)")
+    alpha_sides_rad: float = quantity(..., "rad", "critical angle from the block's dimensions, atan(b / h_b)")
     alpha_sides_uncertainty_rad: float = quantity(..., "rad", f"{_EXPANDED} of alpha_sides_rad")
-    p_rad_s: float = quantity(..., "rad/s", "frequency parameter from the motion")
+    p_rad_s: float = quantity(..., "rad/s", "frequency parameter from the fit of the motion")
     p_uncertainty_rad_s: float = quantity(..., "rad/s", f"{_EXPANDED} of p_rad_s")
-    p_sides_rad_s: float = quantity(..., "rad/s", "frequency parameter of a uniform block with these sides")
+    p_sides_rad_s: float = quantity(..., "rad/s", "frequency parameter of a uniform block of the configured dimensions")
     p_sides_uncertainty_rad_s: float = quantity(..., "rad/s", f"{_EXPANDED} of p_sides_rad_s")
     residual_m: float = quantity(..., "m", "rms residual of the displacement")
     push: float | None = quantity(
@@ -81,7 +81,7 @@ class RockingPoint(Parameters):
     birge: float | None = quantity(
         None, "1", "scatter of r_motion over the tilts, relative to the scatter expected from the uncertainties"
     )
-    uncertainty_parts: str = quantity("", "", "standard uncertainty of r_exp by contribution, JSON object")
+    uncertainty_parts: str = quantity("", "", "standard uncertainty of r_exp by contribution, as JSON")
     remarks: str = quantity("", "", "remarks on the tilt")
 
 
@@ -112,9 +112,9 @@ PROTOCOL = Protocol(
             "r_amplitudes": "restitution r, from the amplitudes",
             "trend": "trend of r",
             "alpha_rad": "critical angle α, from the motion",
-            "alpha_sides_rad": "critical angle α, from the sides",
+            "alpha_sides_rad": "critical angle α, from the dimensions",
             "p_rad_s": "frequency parameter p, from the motion",
-            "p_sides_rad_s": "frequency parameter p, from the sides",
+            "p_sides_rad_s": "frequency parameter p, from the dimensions",
         },
         live=deferred("protocols.free_rocking.live:rocking_view"),
     ),

@@ -38,16 +38,17 @@ _COLUMNS = (
 )
 
 _FIT = "impacts of "
-"""Prefix for the names of fits of single impacts."""
+"""Prefix of the name of a fit that contains the single impacts of a tilt."""
 
 _MOTION = (("r_motion", "r_exp"), ("r_motion_uncertainty", "r_exp_uncertainty"))
-"""Fields whose values always come from the fit, each with its name in older files."""
+"""Fields of the restitution from the fit of the motion, each with the field that contains it in older files."""
 
 
 @dataclass(frozen=True, eq=False)
 class Impacts:
-    """Impacts after one `tilt` [rad], arrays of shape (n,): `speed`, relative to the speed in a fall from the critical
-    angle; `restitution` r; and `uncertainty`, the expanded uncertainty of r due to noise.
+    """Impacts after the release from one `tilt` [rad], arrays of shape (n,): `speed`, the angular velocity at impact
+    relative to that of a fall from the critical angle; `restitution` r; `uncertainty`, the expanded uncertainty of r
+    due to noise.
     """
 
     tilt: float
@@ -68,7 +69,7 @@ def rocking_table(points: Sequence[RockingPoint]) -> str:
 
 
 def rocking_figure(points: Sequence[RockingPoint], tilts: Sequence[Tilt], found: Findings | None) -> "Figure":
-    """Figure of four panels, with the motion of the largest tilt; empty without a result."""
+    """Figure of four panels: motion of the largest tilt, residual, impacts and uncertainties; empty without result."""
     figure = new_figure(8.0, 11.0)
     motion, left, single, parts = figure.subplots(4, 1, height_ratios=(3, 1.5, 3, 1.6))
     for panel in (motion, left, single, parts):
@@ -108,9 +109,9 @@ def _combined(point: RockingPoint) -> list[str]:
     return [
         f"r_exp / r_th = {point.ratio:.6f} +- {point.ratio_uncertainty:.1g} (k = 2){by}, r_th = {point.r_th:.6f}"
         f"{birge}",
-        f"change of r with impact velocity: {trend[0]} +- {trend[1]}",
-        f"alpha = {alpha[0]} +- {alpha[1]} rad from the motion; {point.alpha_sides_rad:.6f} rad from the sides",
-        f"p = {p[0]} +- {p[1]} rad/s from the motion; {point.p_sides_rad_s:.5f} rad/s from the sides",
+        f"change of r over the whole range of impact velocities: {trend[0]} +- {trend[1]}",
+        f"alpha = {alpha[0]} +- {alpha[1]} rad from the motion; {point.alpha_sides_rad:.6f} rad from the dimensions",
+        f"p = {p[0]} +- {p[1]} rad/s from the motion; {point.p_sides_rad_s:.5f} rad/s from the dimensions",
         *([f"check: {point.remarks}"] if point.remarks else []),
     ]
 
@@ -126,7 +127,7 @@ def _motion(motion: "Axes", left: "Axes", tilt: Tilt) -> None:
     end = float(fit.times[-1]) + 1.0
     shown = slice(None, int(end * seen.sample_rate), max(round(seen.sample_rate / 500.0), 1))
     motion.plot(seen.times[shown], 1e3 * (seen.displacement[shown] - zero), color=BLACK, lw=0.9, label="measured")
-    # NaN separates the parts of the fit in the plotted line
+    # NaN interrupts the plotted line between the swings of the fit
     broken = np.insert(1e3 * (fit.fitted - zero), np.flatnonzero(np.diff(fit.swing)) + 1, np.nan)
     times = np.insert(fit.times, np.flatnonzero(np.diff(fit.swing)) + 1, np.nan)
     motion.plot(times, broken, "--", color=VERMILLION, lw=1.2, label="exact motion, fitted")
@@ -161,7 +162,7 @@ def _impacts_figure(tilts: Sequence[Impacts], mean: float, theory: float) -> "Fi
 
 
 def _draw_impacts(panel: "Axes", tilts: Sequence[Impacts], mean: float, theory: float) -> None:
-    """Draw the single impacts, the identified `mean` restitution, and the theoretical one."""
+    """Draw the restitution of each impact, the identified `mean`, and the value of the `theory`."""
     for number, tilt in enumerate(tilts):
         panel.errorbar(
             tilt.speed,
@@ -218,7 +219,7 @@ def _result_text(row: Mapping[str, Any]) -> str:
     )
     return (
         f"rₑₓₚ / rₜₕ = {ratio}, from {row['impacts']} impacts of the stand-alone block on a table clamped to the"
-        f" ground, with rₜₕ = {theory} from the block's sides. Uncertainties are expanded (k = 2). {by}"
+        f" ground, with rₜₕ = {theory} from the block's dimensions. Uncertainties are expanded (k = 2). {by}"
     )
 
 
@@ -235,7 +236,13 @@ def _shape_table(row: Mapping[str, Any]) -> Table:
         for name, unit, meaning in names
     ]
     rows.append(
-        ["r", "change of r over all speeds", with_uncertainty(row["trend"], row["trend_uncertainty"]), "0", "1"]
+        [
+            "r",
+            "change of r over all impact velocities",
+            with_uncertainty(row["trend"], row["trend_uncertainty"]),
+            "0",
+            "1",
+        ]
     )
     columns = [
         Column("symbol", words=True),

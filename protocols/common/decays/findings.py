@@ -1,6 +1,6 @@
-"""Results of decays: the fit as an event, findings for other runs, and the masses on which the findings depend.
+"""Results of decays: the fit as an event, findings for other runs, and the storey masses on which the findings depend.
 
-The masses of the storeys are taken from the specimen file if it contains them, otherwise from the configuration.
+The masses are taken from the specimen file if it contains them, otherwise from the configuration.
 """
 
 from collections.abc import Generator
@@ -33,7 +33,7 @@ MASSES = ("m1", "m2")
 
 
 def fit_finished(decay: Decay, name: str) -> FitFinished:
-    """Event with a fitted decay and the lasers' signals."""
+    """Event with the fit of a decay, labelled `name`, and the lasers' signals."""
     fit, stretch = decay.fit, decay.fit.stretch
     columns = {"time": Series(stretch.time, "s", "time since the start of the recording")}
     for row, laser in enumerate(STOREYS):
@@ -103,12 +103,12 @@ def impossible_values(result: FrameResult) -> str | None:
 
 
 def through_masses(shift: Array, known: Identified, name: str) -> float:
-    """Covariance of a known quantity with a quantity whose sensitivity to the known masses is `shift`, shape (2,)."""
+    """Covariance of the known quantity `name` with one whose sensitivity to the masses is `shift`, shape (2,)."""
     return float(shift @ [known_covariance(known, mass, name) for mass in MASSES])
 
 
 def known_covariance(known: Identified, first: str, second: str) -> float:
-    """Covariance of two findings, or variance if both are the same."""
+    """Covariance of two known quantities, or the variance if both names are the same."""
     places = (first,) if first == second else (first, second)
     return float(known.covariance(places)[0, -1])
 
@@ -116,8 +116,8 @@ def known_covariance(known: Identified, first: str, second: str) -> float:
 def correlations_with(
     name: str, own: float, covariances: dict[str, float], others: dict[str, float]
 ) -> list[Correlation]:
-    """Correlations of `name`, whose standard uncertainty is `own`, with other quantities, from the covariances with
-    them and their standard uncertainties.
+    """Correlations of `name`, whose standard uncertainty is `own`, with other quantities: `covariances` are those with
+    `name`, and `others` the standard uncertainties of the other quantities.
     """
     return [
         Correlation(first=name, second=other, coefficient=float(np.clip(covariance / (others[other] * own), -1.0, 1.0)))
@@ -171,7 +171,7 @@ def mass_warning(configuration: BenchConfiguration) -> Generator[Step, Outcome, 
 
 
 def _summary(values: np.ndarray, uncertainties: np.ndarray) -> str:
-    """One-line summary of the four quantities with their standard uncertainties."""
+    """One-line summary of the stiffnesses and damping ratios with their standard uncertainties."""
     return ", ".join(
         f"{name} {in_brackets(float(values[index]), float(uncertainties[index]))}"
         + (f" {UNITS[index]}" if UNITS[index] != "1" else "")
@@ -181,4 +181,4 @@ def _summary(values: np.ndarray, uncertainties: np.ndarray) -> str:
 
 def _masses_text(known: Identified) -> str:
     found = [finding for name in MASSES if (finding := known.finding(name)) is not None]
-    return ", ".join(f"{one.name} = {one.value:.6g} kg ({one.standard_uncertainty:.2g} kg)" for one in found)
+    return ", ".join(f"{one.name} = {one.value:.6g} kg (u = {one.standard_uncertainty:.2g} kg)" for one in found)

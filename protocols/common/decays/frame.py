@@ -1,4 +1,4 @@
-"""Combination of decays: the quantities `response.NAMES` and the slopes of the damping, with all covariances."""
+"""Combination of decays: the eight quantities `response.NAMES` and the slopes of the damping, with all covariances."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -24,11 +24,11 @@ SIGNIFICANT = 2.576
 class FrameResult:
     """Result of one or several decays.
 
-    `frame` contains the combined quantities, `slopes` the combined changes of the damping with amplitude [1/m].
-    `masses` [kg] are the weighed masses, `masses_covariance` [kg2], shape (2, 2), is their covariance. `mass_shift`,
-    shape (8, 2), is the sensitivity of the quantities to the masses, `time_shift`, shape (8,), is the sensitivity to
-    the timebase multiplied by the timebase's standard uncertainty. `parts` holds the standard uncertainties, shape
-    (8,), by contribution.
+    `frame` contains the eight combined quantities, `slopes` the combined changes of the damping ratios with amplitude
+    [1/m]. `masses` [kg] are the weighed masses; `masses_covariance` [kg2], shape (2, 2), is their covariance.
+    `mass_shift`, shape (8, 2), is the sensitivity of the quantities to the masses; `time_shift`, shape (8,), is their
+    sensitivity to the timebase, multiplied by the timebase's standard uncertainty. `parts` holds the standard
+    uncertainties of the quantities, shape (8,), by contribution.
     """
 
     decays: tuple[Decay, ...]
@@ -71,7 +71,7 @@ class FrameResult:
 
 
 def frame_result(decays: Sequence[Decay], masses: tuple[float, float], masses_covariance: Array) -> FrameResult:
-    """Combine the decays of one frame."""
+    """Combined result of the decays of one frame with the weighed `masses` [kg]."""
     frame = combine(
         [one.quantities for one in decays],
         [one.uncertainty.own for one in decays],
@@ -139,7 +139,7 @@ def _course_json(course: DampingCourse) -> str:
 
 
 def _short(value: float) -> float:
-    """The value rounded to five digits, for strings in a data file."""
+    """The value rounded to five significant digits, for strings in a data file."""
     return float(f"{value:.5g}")
 
 
@@ -156,7 +156,7 @@ _FIELDS = (
 
 
 def _part(name: str, decays: Sequence[Decay], frame: Combined) -> Array:
-    """Standard uncertainty due to one contribution, which averages out unless it is common to all decays."""
+    """Standard uncertainties due to one contribution, shape (8,); it averages out unless common to all decays."""
     variances = np.array([np.diag(one.uncertainty.parts[name]) for one in decays])
     return np.sqrt(np.mean(variances, axis=0) if name in COMMON else np.sum(frame.weights**2 * variances, axis=0))
 

@@ -15,13 +15,13 @@ def decay_panel(run: LiveRun) -> Panel:
 
 
 def decay_view(run: LiveRun) -> LiveView:
-    """The last decay, and the stiffness of each storey by decay, relative to the mean of the decays so far."""
+    """The last fitted decay, and the stiffness of each storey by decay, relative to the mean of the decays so far."""
     decays = [point for point in run.points if getattr(point, "decay", 0) > 0]
     stiffness = Panel(
         "stiffness, deviation from the mean",
         ("decay", "1"),
         ("deviation", "%"),
-        awaits="The stiffnesses appear here, decay by decay.",
+        awaits="The stiffnesses appear here after each decay.",
     )
     number = run.column("decay", decays)
     for name in ("k1", "k2") if decays else ():

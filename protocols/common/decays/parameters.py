@@ -18,14 +18,14 @@ class DecayParameters(Parameters):
     drift: float = quantity(
         0.030,
         "m",
-        "target peak of the drift after a pulse, reduced where a limit of the bench requires it",
+        "target peak of the drift after a pulse, reduced if a limit of the bench requires it",
         gt=0,
         le=1,
     )
     pulse: float | None = quantity(
         None,
         "s",
-        "duration of the pulse; if absent, the inverse of the geometric mean of the frame's frequencies",
+        "duration of the pulse; if absent, the inverse of the geometric mean of the frame's natural frequencies",
         gt=0,
         le=10,
         usual=(0.02, 3.0),
@@ -44,7 +44,7 @@ class DecayParameters(Parameters):
         0.0005, "kg", "standard uncertainty of the weighed mass of each storey", ge=0, le=0.1
     )
     mass_correlation: float = quantity(
-        0.0, "1", "correlation of the errors of the two masses: 1 if both are due to the balance", ge=0, le=1
+        0.0, "1", "correlation of the errors of the two masses: 1 if both are errors of one balance", ge=0, le=1
     )
 
 
@@ -61,9 +61,9 @@ class DecayPoint(Parameters):
     xi1_uncertainty: float = quantity(..., "1", EXPANDED)
     xi2: float = quantity(..., "1", "damping ratio of the second mode")
     xi2_uncertainty: float = quantity(..., "1", EXPANDED)
-    c1_n_s_m: float = quantity(..., "N s/m", "dashpot of the first storey")
+    c1_n_s_m: float = quantity(..., "N s/m", "dashpot coefficient of the first storey")
     c1_uncertainty: float = quantity(..., "N s/m", EXPANDED)
-    c2_n_s_m: float = quantity(..., "N s/m", "dashpot of the second storey")
+    c2_n_s_m: float = quantity(..., "N s/m", "dashpot coefficient of the second storey")
     c2_uncertainty: float = quantity(..., "N s/m", EXPANDED)
     omega1_rad_s: float = quantity(..., "rad/s", "undamped circular frequency of the first mode")
     omega1_uncertainty: float = quantity(..., "rad/s", EXPANDED)
@@ -74,11 +74,11 @@ class DecayPoint(Parameters):
     birge: float | None = quantity(
         None, "1", "largest Birge ratio: scatter of the decays relative to their uncertainty; absent for one decay"
     )
-    slope1_per_m: float = quantity(..., "1/m", "change of xi1 with the amplitude of the drift in the first mode")
+    slope1_per_m: float = quantity(..., "1/m", "change of xi1 per metre of drift amplitude in the first mode")
     slope1_uncertainty: float = quantity(..., "1/m", EXPANDED)
-    slope2_per_m: float = quantity(..., "1/m", "change of xi2 with the amplitude of the drift in the second mode")
+    slope2_per_m: float = quantity(..., "1/m", "change of xi2 per metre of drift amplitude in the second mode")
     slope2_uncertainty: float = quantity(..., "1/m", EXPANDED)
-    damping_is_linear: bool = quantity(..., "", "whether neither slope is significant (99 %)")
+    damping_is_linear: bool = quantity(..., "", "whether neither slope of the damping ratios is significant (99 %)")
     k1_parts: str = quantity("", "", _PARTS)
     k2_parts: str = quantity("", "", _PARTS)
     xi1_parts: str = quantity("", "", _PARTS)

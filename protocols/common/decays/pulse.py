@@ -29,7 +29,7 @@ SHARE = 0.75
 """Fraction of each limit that is used."""
 
 QUIET = 2.0
-"""Time at rest in the recording before the pulse [s], from which the noise of the table's sensor is determined."""
+"""Time at rest between the start of the recording and the pulse [s], used to determine the noise of the sensors."""
 
 LEFT, LONGEST = 1.0 / 12.0, 60.0
 """Fraction of the first mode's amplitude that remains at the end of the window, and longest automatic window [s]."""
@@ -41,7 +41,7 @@ _FEWEST = 20
 """Minimum number of samples of a pulse."""
 
 _PADDING = 20.0
-"""Time at rest appended to a pulse in a Fourier transform [s]."""
+"""Duration of the zeros appended to a pulse for its Fourier transform [s]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,8 +78,8 @@ class Pulse:
 
 
 def frequencies(specimen: Specimen) -> Array:
-    """Undamped circular frequencies of the frame [rad/s], shape (2,), ascending, with a spring fixed at the block's
-    end.
+    """Undamped circular frequencies of the frame [rad/s], shape (2,), ascending. The block's end of the coupling
+    spring, if mounted, is assumed fixed.
     """
     mass, _, stiffness = frame_matrices(specimen.frame)
     stiffness[0, 0] += specimen.k_c
@@ -88,14 +88,14 @@ def frequencies(specimen: Specimen) -> Array:
 
 
 def decay_pulse(parameters: DecayParameters, configuration: BenchConfiguration, specimen: Specimen) -> Pulse:
-    """Pulse for a specimen, bare or with the block clamped."""
+    """Pulse for the bare frame, or for a specimen with the block clamped."""
     omegas = frequencies(specimen)
     duration = parameters.pulse or 2.0 * pi / sqrt(float(omegas.prod()))
     return Pulse(duration, decay_window(parameters, specimen), configuration.sample_rate)
 
 
 def decay_window(parameters: DecayParameters, specimen: Specimen) -> float:
-    """Duration of a decay after its excitation [s]."""
+    """Time recorded after the excitation [s]."""
     if parameters.window is not None:
         return parameters.window
     rate = specimen.frame.xi1 * float(frequencies(specimen).min())
@@ -106,7 +106,7 @@ def decay_window(parameters: DecayParameters, specimen: Specimen) -> float:
 class PlannedPulse:
     """A pulse, its expected peak `drift` [m], and its demands, by the keys of `bench.preflight.margins`.
 
-    Unknown demands are absent. `binds` names the limit that determines the drift.
+    Unknown demands are absent. `binds` names the limit that determines the drift, or is "requested drift".
     """
 
     pulse: Pulse
@@ -116,7 +116,7 @@ class PlannedPulse:
 
 
 def plan_pulse(parameters: DecayParameters, configuration: BenchConfiguration, specimen: Specimen) -> PlannedPulse:
-    """Plan the pulse at the level allowed by the bench.
+    """Plan the pulse for the requested drift, or for the largest drift that the bench allows.
 
     The table of a simulated bench is modelled by its shaker. Any other table is assumed to follow the drive in
     velocity. Raises InvalidInput for a pulse that is too short, or too weak within the limits.
@@ -140,8 +140,8 @@ def plan_pulse(parameters: DecayParameters, configuration: BenchConfiguration, s
     binding = "requested drift" if wanted <= allowed[binds] else binds
     drift = scale * unit["drift"]
     if drift < LEAST:
-        needs = f"the limits on {binding} allow a drift of only {drift:.2g} m, but a decay needs {LEAST:g} m"
-        raise InvalidInput("pulse", pulse.duration, f"{needs}: raise that limit, or choose another pulse duration")
+        needs = f"the limit on {binding} allows a drift of only {drift:.2g} m, but a decay needs {LEAST:g} m"
+        raise InvalidInput("pulse", pulse.duration, f"{needs}: raise this limit, or choose another pulse duration")
     return PlannedPulse(pulse, drift, {name: scale * value for name, value in unit.items()}, binding)
 
 
@@ -160,7 +160,7 @@ def pulse_forecast(configuration: BenchConfiguration, pulses: Mapping[str, Plann
 
 
 def _unit_demands(pulse: Pulse, configuration: BenchConfiguration, specimen: Specimen) -> dict[str, float]:
-    """Largest magnitudes under a drive of 1 V or, for an unknown table, a velocity of 1 m/s."""
+    """Demands of a pulse with a peak of 1 V in the drive or, for an unknown table, of 1 m/s in the table's velocity."""
     drive = pulse.record(1.0, 5.0)
     response = response_of(configuration)
     if not isinstance(response, SimulatedTable):

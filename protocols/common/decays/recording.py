@@ -1,6 +1,6 @@
-"""Recording of the decays of one frame: search for the level, then recording, fit and point of each decay.
+"""Recording of the decays of one frame: search for the drive level, then recording, fit and result of each decay.
 
-An unusable decay is repeated once, then omitted.
+A decay that cannot be used is repeated once; if the repetition cannot be used either, it is omitted.
 """
 
 from collections.abc import Callable, Generator
@@ -27,13 +27,13 @@ from sim.parameters import Parameters
 Array = NDArray[np.float64]
 
 REST = 2.0
-"""Time at rest before each pulse, in which the signals are zeroed [s]."""
+"""Time at rest before each recording, during which the signals are zeroed [s]."""
 
 STILL = 5e-5
 """Scatter below which the storeys are considered at rest [m]; larger than that due to the resolution of a laser."""
 
 WAITING = 45.0
-"""Expected time of a recording in addition to its drive: settling of the storeys, rest, ramp [s]."""
+"""Expected time of a recording in addition to the duration of its drive [s]: settling of the storeys, rest, ramp."""
 
 DETECTABLE = 20.0
 """Minimum ratio of the drift in a probe to the noise."""
@@ -59,7 +59,7 @@ class Pace:
         return Progress(self.elapsed / self.expected, self.expected - self.elapsed, activity)
 
     def finish(self, begun: float, planned: float) -> None:
-        """Register the end of a part with an expected duration of `planned` [s] that began when `begun` [s] had
+        """Register the end of a part of the run, expected to last `planned` [s], that began when `begun` [s] had
         elapsed.
 
         Its actual duration, which depends on the number of probes and repetitions, replaces the expected one.
@@ -94,9 +94,11 @@ def record(volts: Array, sample_rate: float, pace: Pace, activity: str) -> Gener
 def find_level(
     pulse: Pulse, drift: float, configuration: BenchConfiguration, pace: Pace
 ) -> Generator[Step, Outcome, float]:
-    """Find the drive [V] whose pulse causes a peak of `drift` [m], or the largest drift that the limits allow.
+    """Find the peak drive [V] of the pulse that causes a peak of `drift` [m], or the largest drift that the limits
+    allow.
 
-    Raises Unmeasurable if the frame does not respond, or if its drift cannot reach `LEAST`.
+    Raises Unmeasurable if the frame does not respond, if the limits allow less than `LEAST`, or if the drift is not
+    reached after `_MOST` probes.
     """
     volts, seen, limit = PROBE, 0.0, _largest_drive(pulse, configuration)
     for probe in range(1, _MOST + 1):
@@ -166,7 +168,7 @@ def _peak(values: Array) -> float:
 
 
 PointMaker = Callable[[FrameResult, int], Parameters]
-"""Creates the point of a result from its number, which is 0 for all decays together."""
+"""Creates the point of a result from the result and the number of the decay, 0 for all decays together."""
 
 PROBES = 3
 """Number of probes that most tables need, used for the expected duration."""
@@ -184,7 +186,7 @@ def pulsed_decays(
     name: str,
     point: PointMaker = decay_point,
 ) -> Generator[Step, Outcome, list[Decay]]:
-    """Find the level, then record the decays; `point` creates the point of each decay.
+    """Find the drive level, then record the decays; `point` creates the point of each decay.
 
     Raises Unmeasurable if no decay is usable.
     """
@@ -198,7 +200,7 @@ def pulsed_decays(
         signals = yield from record(pulse.record(volts), pulse.sample_rate, pace, activity)
         return pulsed_decay(signals, setting, QUIET, pulse.begin)
 
-    how = f"a pulse of {volts:.3g} V, {pulse.length:.0f} s"
+    how = f"a pulse of {volts:.3g} V, recorded for {pulse.length:.0f} s"
     length = pulse.length + WAITING
     return (yield from repeat_decays(parameters, setting, pace, length, once, name, how, point))
 
@@ -256,12 +258,12 @@ def fit_setting(parameters: DecayParameters, configuration: BenchConfiguration) 
 
 
 def pulsed_duration(parameters: DecayParameters, pulse: Pulse) -> float:
-    """Expected duration of the decays after pulses [s]."""
+    """Expected duration of the probes and of all decays [s]."""
     return _probing_duration(pulse) + parameters.repeats * (pulse.length + WAITING)
 
 
 def _probing_duration(pulse: Pulse) -> float:
-    """Expected duration of the probes before the decays [s]."""
+    """Expected duration of the probes [s]."""
     return PROBES * (pulse.begin + WAITING)
 
 

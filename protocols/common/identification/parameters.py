@@ -34,7 +34,7 @@ class IdentifyParameters(Parameters):
     corner: float = quantity(
         1.0,
         "Hz",
-        "frequency below which the motion has constant displacement and above which it has constant acceleration",
+        "frequency below which the lines have equal displacement amplitudes, and above which equal accelerations",
         gt=0,
         le=50,
     )

@@ -1,7 +1,7 @@
 """Steps of an identification.
 
-1. The specimen is mounted. The table is probed with increasing drive, from one too small to cause damage up to the
-   level.
+1. The specimen is mounted. The table is probed with increasing drive: the first one is too small to cause damage, the
+   last one reaches the level of the multisines.
 2. Multisines with random phases are played, each from rest; their first periods are discarded.
 3. Response, noise and distortion are computed from the periods.
 """
@@ -39,7 +39,7 @@ from sim.specimen import Specimen
 Array = NDArray[np.float64]
 
 REST = 2.0
-"""Time at rest before each drive, in which the signals are zeroed [s]."""
+"""Time at rest before each drive, during which the signals are zeroed [s]."""
 
 OVERHEAD = 12.0
 """Time required in addition to the duration of the drive [s]: rest, settling of the storeys, ramp."""
@@ -65,15 +65,15 @@ class Rules:
         if peak > limits.drive_voltage or slew > limits.drive_slew:
             raise Unmeasurable(
                 f"the motion would need {peak:.3g} V and {slew:.3g} V/s of drive, but limits.drive_voltage = "
-                f"{limits.drive_voltage:g} V, limits.drive_slew = {limits.drive_slew:g} V/s: reduce --level, or use "
-                "a narrower band"
+                f"{limits.drive_voltage:g} V and limits.drive_slew = {limits.drive_slew:g} V/s: reduce --level, or "
+                "use a narrower band"
             )
 
     def progress(self, activity: str) -> Progress:
         return Progress(self.gone / self.expected, self.expected - self.gone, activity)
 
     def remains(self, seconds: float) -> None:
-        """Correct the expected remaining time [s], since the number of probes depends on the table."""
+        """Set the expected remaining time [s], which is corrected because the number of probes depends on the table."""
         self.expected = self.gone + seconds
 
     def watch(self) -> Callable[[Array], Event]:
@@ -117,7 +117,8 @@ _MOST = 6
 
 
 def probed_response(motion: Complex, grid: Grid, rules: Rules) -> Generator[Step, Outcome, Complex | Fallen]:
-    """Response of the table [m/s2/V] at the lines, measured with the motion `motion` [m/s2].
+    """Response of the table [m/s2/V] at the lines, shape (n_lines,), measured with increasing drive up to the
+    acceleration spectrum `motion` [m/s2]; `Fallen` if the block falls.
 
     Raises Unmeasurable if the table does not respond, or does not reach this motion.
     """
@@ -137,7 +138,7 @@ def probed_response(motion: Complex, grid: Grid, rules: Rules) -> Generator[Step
             if probe >= _AUDIBLE_BY:
                 raise Unmeasurable(
                     f"the table does not respond to a drive of {_peak(drive, short):.2g} V: {answer:.2g} m/s2, noise"
-                    f" {noise:.2g}; check the amplifier, the enable line, the emergency stop and the accelerometer"
+                    f" {noise:.2g} m/s2; check the amplifier, the enable line, the emergency stop and the accelerometer"
                 )
             drive = GROWTH * drive
             continue
@@ -159,9 +160,9 @@ def _acceleration(outcome: Played) -> NDArray[np.float64]:
 def _answer(moved: Complex) -> tuple[float, float]:
     """Response and its noise [m/s2], from the amplitudes `moved`, shape (periods, n_lines).
 
-    The response is the root sum of squares, over the lines, of the mean amplitudes of the periods; the noise is that of
-    the standard errors of these means, estimated from the scatter between periods. If the table does not respond, the
-    two are equal but for a random difference, which decreases with the number of lines.
+    The response is the root sum of squares, over the lines, of the mean amplitudes of the periods; the noise is the
+    root sum of squares of the standard errors of these means, estimated from the scatter between periods. If the table
+    does not respond, the two differ only randomly, and the difference decreases with the number of lines.
     """
     periods, mean = moved.shape[0], moved.mean(axis=0)
     noise = np.sum(np.abs(moved - mean) ** 2) / (periods * (periods - 1))
@@ -247,18 +248,21 @@ def _fell(specimen: Specimen) -> Generator[Step, Outcome, Unmeasurable]:
 
 
 def _warned(outcome: Played, specimen: Specimen, configuration: BenchConfiguration) -> Generator[Step, Outcome, None]:
-    """Warn if the measured motion was close to uplift, since a rocking block changes the system."""
+    """Warn if the measured motion may have lifted the block, since a rocking block changes the system."""
     moved = outcome.signals[:, ACCELERATION]
     share = resting_demands(moved, configuration.sample_rate, specimen, configuration).get(RESTING, 0.0)
     if share > 1.0:
-        text = f"the block may have lifted: the overturning moment reached {share:.2f} times that of its weight"
+        text = (
+            f"the block may have lifted: the overturning moment reached {share:.2f} times the restoring moment of its"
+            " weight; reduce --level"
+        )
         yield Publish(Warned(text))
 
 
 def _identified(
     records: Sequence[Played], found: Planned, specimen: Specimen
 ) -> tuple[TableModel, tuple[float, float]]:
-    """Table model, with gain and lead [s] of the displacement sensor relative to the accelerometer."""
+    """Table model, and gain and lead [s] of the displacement sensor relative to the accelerometer."""
     grid = found.grid
     drive = np.array([grid.used(record.drive) for record in records])
     moved = [np.array([grid.used(record.signals[:, at]) for record in records]) for at in (ACCELERATION, DISPLACEMENT)]

@@ -1,5 +1,5 @@
-"""Multisines of an identification: requested motions, their level within the limits of bench and resting block, and
-their drive.
+"""Multisines of an identification: motions of the table, their level within the limits of the bench and of the resting
+block, and their drive.
 """
 
 from dataclasses import dataclass
@@ -32,7 +32,9 @@ _LEFT = 0.02
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """Frequency lines of an identification, and the number of `discarded` and used `periods`."""
+    """Frequency lines of an identification, number of `samples` per period, and numbers of `discarded` and used
+    `periods`.
+    """
 
     lines: Lines
     samples: int
@@ -47,7 +49,7 @@ class Grid:
 
     @property
     def fade(self) -> int:
-        """Number of samples of the fade-in and of the fade-out."""
+        """Number of samples of the fade-in, equal to that of the fade-out."""
         return round(FADE * self.samples)
 
     @property
@@ -84,7 +86,7 @@ def grid(parameters: IdentifyParameters, configuration: BenchConfiguration, spec
         raise InvalidInput(
             "period", parameters.period, f"a line at {low:g} Hz needs a period of at least {1.0 / low:g} s"
         )
-    # the lines include both ends of the band, so that no value is extrapolated
+    # the lines enclose the band, so that no value within it is extrapolated
     wide = (2 if parameters.odd_lines else 1) * spacing
     lines = band_lines(samples, rate, (max(low - wide, spacing), high + wide), odd=parameters.odd_lines)
     first = int(np.searchsorted(lines * spacing, low * (1.0 + 1e-9), side="right")) - 1
@@ -101,7 +103,9 @@ def band(parameters: IdentifyParameters, configuration: BenchConfiguration) -> t
 
 
 def required_motions(parameters: IdentifyParameters, lines: Grid) -> list[Complex]:
-    """Complex amplitudes of the table's acceleration at the lines for each realisation, with a peak of 1 m/s2."""
+    """Complex amplitudes of the table's acceleration at the lines, shape (n_lines,), for each realisation; every motion
+    has a peak of 1 m/s2.
+    """
     frequency = lines.frequency
     amplitudes = drive_amplitudes(frequency, np.ones(frequency.size), "displacement", parameters.corner)
     random = np.random.default_rng(parameters.phase_seed)
@@ -148,9 +152,10 @@ BLOCK_SHARE = 0.6
 
 @dataclass(frozen=True, eq=False)
 class Planned:
-    """Planned multisines: acceleration spectra `motions` at the lines of `grid`, with a largest peak of `level` [m/s2].
+    """Planned multisines: acceleration spectra `motions` at the lines of `grid`, each with a peak of `level` [m/s2].
 
-    `demands` holds the largest demands of the motions. `binds` names the limit that determines the level.
+    `demands` holds the largest demands of the motions. `binds` names the limit that determines the level, or is "level"
+    if the level is the requested one.
     """
 
     grid: Grid
@@ -172,7 +177,7 @@ def mounted_name(specimen: Specimen) -> str:
 
 
 def planned(parameters: IdentifyParameters, configuration: BenchConfiguration) -> Planned:
-    """Plan the motions at the allowed level.
+    """Plan the motions at the requested level, or at the highest level that the bench allows.
 
     The drive limits the level only if the table is known, because it is simulated or was identified before. Raises
     InvalidInput for a band that the bench cannot produce.
@@ -200,7 +205,7 @@ def _motion_demands(
 
 
 def _drive(lines: Grid, motion: Complex, specimen: Specimen, configuration: BenchConfiguration) -> dict[str, float]:
-    """Peaks of the drive and of its slew rate, if the response of the table is known over the entire band."""
+    """Peaks of the drive [V] and of its slew rate [V/s]; empty if the response of the table is unknown."""
     response = response_of(configuration)
     if response is None:
         return {}

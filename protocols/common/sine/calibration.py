@@ -15,7 +15,7 @@ from sim.specimen import Specimen
 from sim.steady import resting_level
 
 REST = 2.0
-"""Time at rest before a test, in which the signals are zeroed [s]."""
+"""Time at rest before a test, during which the signals are zeroed [s]."""
 
 NO_BLOCK = "storey 1 has a permanent offset although the block was removed: check lasers and specimen"
 
@@ -28,7 +28,7 @@ def bare_calibration(
     """Calibrate the drive of the `bare` frame at `omegas` [rad/s], and from the highest of them up to its harmonic
     `parameters.harmonics`, for tests at `amplitude` [m/s2].
 
-    The table remains armed with this calibration.
+    The table remains armed with this calibration. Raises RigError if a fall of the block is detected.
     """
     yield OperatorAction(OperatorTask.REMOVE_BLOCK, bare, "Remove the spring and the block from the table.")
     yield Arm(REST)
@@ -48,8 +48,8 @@ def spring_calibration(
     """Calibrate the drive of the coupled frame, with the block at rest, at `omegas` [rad/s] and all frequencies of the
     `starts`, with table accelerations of at most `level` [m/s2], and end the test.
 
-    Far above the frame's modes the block merely adds mass, so that the response of the `bare` frame is used there. It
-    is also used if the block fell.
+    Far above the frame's modes the block only adds mass, so the response of the `bare` frame is used there. It is also
+    used if the block falls during the calibration.
     """
     request = f"Set the block upright on its base and mount the spring of beta = {specimen.label:g}."
     yield OperatorAction(OperatorTask.MOUNT_SPRING, specimen, request)
@@ -64,8 +64,8 @@ def spring_calibration(
 def resting_calibration(
     specimen: Specimen, omegas: Sequence[float], starts: Sequence[Start], level: float
 ) -> tuple[list[float], float]:
-    """Frequencies [rad/s] and level [m/s2] of the drive calibration with a spring, which leaves the block at rest; the
-    level is at most `level`.
+    """Frequencies [rad/s] and level [m/s2] of the drive calibration with a spring. The level leaves the block at rest
+    and does not exceed `level`.
     """
     swept = sorted({segment.omega for start in starts for segment in start.segments})
     grid = np.linspace(swept[0], swept[-1], max(round((swept[-1] - swept[0]) / 1.5) + 1, 2))
@@ -74,7 +74,9 @@ def resting_calibration(
 
 
 def end_test(specimen: Specimen, *, fast: bool) -> Generator[Step, Outcome, None]:
-    """Ramp out, fast if the block has fallen, and then request that a fallen block be set upright."""
+    """Ramp out, quickly if `fast`, which means that the block has fallen; then request that a fallen block be set
+    upright.
+    """
     outcome = yield RampOut(fast=fast)
     if fast or isinstance(outcome, Fallen):
         yield OperatorAction(OperatorTask.STAND_BLOCK_UP, specimen, FALLEN_REQUEST)

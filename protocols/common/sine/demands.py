@@ -33,7 +33,8 @@ from sim.specimen import Specimen
 from sim.sweep import Done, in_threads
 
 HOLD, BARE_HOLD = 20.0, 40.0
-"""Simulated duration of a stage's last sine [s], longer than the transients of a rocking block."""
+"""Simulated durations of a stage's last sine, with the block and with the bare frame [s], longer than the transients.
+"""
 
 PROBES = (PROBE, 10.0 * PROBE)
 """Amplitudes [V] of the probes of an unknown table."""
@@ -47,12 +48,14 @@ maximum.
 """
 
 RIPPLE = 0.03
-"""Allowance, in the demands on table and drive, for noise and for the effects of friction that a calibration at half
-the level does not detect.
+"""Relative allowance, in the demands on table and drive, for noise and for the effects of friction that a calibration
+at half the level does not detect.
 """
 
 IMPACTS = 0.15
-"""Allowance for quantities that the impacts of a rocking block increase until the table's harmonics are cancelled."""
+"""Relative allowance for the impacts of a rocking block, which increase some demands until the table's harmonics are
+cancelled.
+"""
 
 OFF_MIDDLE = 0.015
 """Largest offset of a storey at rest from the middle of the laser's range, relative to half the range."""
@@ -95,14 +98,14 @@ class Trial:
 
     @property
     def begin(self) -> float:
-        """Start of the evaluation [s]."""
+        """Start of the evaluation, from the start of the simulation [s]."""
         return sum(segment.duration for segment in self.before)
 
 
 def spring_calibration_trial(
     specimen: Specimen, omegas: Sequence[float], starts: Sequence[Start], level: float
 ) -> Trial:
-    """Calibration of the coupled frame with the block at rest."""
+    """Trial of the drive calibration with the coupled frame and the block at rest, at most at `level` [m/s2]."""
     wanted, allowed = resting_calibration(specimen, omegas, starts, level)
     segments = calibration_segments([(omega, allowed) for omega in wanted])
     return Trial(Stage(f"calibration of the drive with beta = {specimen.label:g}", segments), specimen)
@@ -115,11 +118,10 @@ def bare_calibration_trial(
     specimen: Specimen,
     response: TableResponse | None,
 ) -> Trial:
-    """Calibration of the bare frame for tests at `amplitude` [m/s2].
+    """Trial of the drive calibration with the bare frame, for tests at `amplitude` [m/s2].
 
-    Each drive follows from the response at the previous frequency, the first one from the response to the probe.
-    Friction considerably reduces the response to a small probe, so the resulting drive moves the table more than
-    intended.
+    Each drive is computed from the response at the previous frequency, the first one from the response to the probe.
+    Friction considerably reduces the response to a small probe, so the first drive moves the table more than intended.
     """
     level = parameters.calibration_level * amplitude
     first = omegas[0]
@@ -151,8 +153,8 @@ def _measured(omega: float, level: float) -> tuple[Segment, Segment]:
 
 
 def slow(specimen: Specimen, omega: float, amplitude: float) -> bool:
-    """Whether a hold is expected, because disturbances of the rocking orbit at `omega` [rad/s] and `amplitude` [m/s2]
-    hardly decay, or grow.
+    """Whether the rocking orbit at `omega` [rad/s] and `amplitude` [m/s2] is expected to be held, because disturbances
+    of it grow or hardly decay.
     """
     branch = predict_gain(specimen, omega, amplitude).rocking
     return branch is not None and branch.multiplier > SLOW
@@ -166,9 +168,9 @@ def demands_of(
 ) -> tuple[Demand, ...]:
     """Demands of all trials.
 
-    `steady` returns the steady motion at a stiffness ratio and frequency [rad/s], if it is also evaluated. A drawn
-    specimen and the error of its drive are used for all stages. Raises InvalidInput for a table model that cannot be
-    read or does not cover the frequencies.
+    `steady`, if given, returns the steady motion at a stiffness ratio and a frequency [rad/s], which is evaluated as
+    well. A drawn specimen and the error of its drive are used for all stages. Raises InvalidInput for a table model
+    that cannot be read or does not cover the frequencies.
     """
     response = response_of(configuration)
     factors = np.concatenate(([1.0], 1.0 + DRIVE * np.random.default_rng(SEED).uniform(-1.0, 1.0, DRAWS)))

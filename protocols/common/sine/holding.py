@@ -39,18 +39,20 @@ and the measurement.
 """
 
 SLOW = 0.985
-"""Modulus of the slowest multiplier on fixed ground above which a hold is prepared before the test."""
+"""Modulus of the slowest Floquet multiplier on fixed ground above which a hold is prepared before the test."""
 
 UPDATES = 8
 """Largest number of corrections of the table while a motion is held."""
 
 RELEASED, GROWN = 120, 0.3
-"""Largest number of cycles observed after the release, and relative deviation of a peak that ends the observation."""
+"""Largest number of cycles observed after the release, and relative deviation of the peak drift from that of the orbit
+that ends the observation.
+"""
 
 KICK, FADING = 0.003, 12
-"""Control in a single cycle after the measurement, as a share of the amplitude, without which the deviation would take
-a hundred cycles to grow from the noise; and number of cycles after it in which the effects of the other multipliers
-fade.
+"""Control in a single cycle after the measurement, relative to the amplitude, that starts the deviation; from noise
+alone it would take a hundred cycles to grow. Number of cycles after it in which the effects of the other multipliers
+decay.
 """
 
 
@@ -79,8 +81,8 @@ def prepared(orbit: Orbit | None, shaker: Shaker | None, harmonics: int) -> Stab
 
 
 def too_late(configuration: BenchConfiguration, omega: float) -> str | None:
-    """Reason why a motion at `omega` [rad/s] cannot be held, because corrections would begin later than `DELAY` cycles
-    after the measured cycle; None if it can be held.
+    """Reason why a motion at `omega` [rad/s] cannot be held: corrections would take effect more than `DELAY` cycles
+    after the measured cycle. None if it can be held.
 
     The last sample of a cycle is read up to a block late, and a command takes effect after the lead.
     """
@@ -90,7 +92,7 @@ def too_late(configuration: BenchConfiguration, omega: float) -> str | None:
         return None
     return (
         f"acquisition.block_duration and acquisition.lead, together {latency:.3g} s, are longer than a cycle of "
-        f"{cycle:.3g} s, so that a correction would come too late: reduce them"
+        f"{cycle:.3g} s, so a correction would be too late: reduce them"
     )
 
 
@@ -104,10 +106,10 @@ def hold(
     accuracy: SensorAccuracy,
     report: Report,
 ) -> Generator[Step, Outcome, Held | Fallen]:
-    """Capture the orbit of `design` from the present motion, hold it, and measure it.
+    """Capture the orbit of `design` from the present motion, hold it, measure it, and observe its motion after release.
 
     `largest` [m] is the largest peak drift allowed. The amplitude control is inactive while the motion is captured;
-    then it corrects the shares to which the control of the hold is added.
+    after that it corrects the harmonics of the drive, to which the control of the hold is added.
     """
     run = Hold(sine, table, design, largest, parameters, accuracy)
     held = yield from capture_and_measure(run, beta, report)
@@ -122,9 +124,9 @@ def hold(
 
 
 def capture_and_measure(run: "Hold", beta: float, report: Report) -> Generator[Step, Outcome, Held | Fallen]:
-    """Capture the orbit from the present motion, correct the table, and measure the held motion.
+    """Capture the orbit from the present motion, correct the motion of the table, and measure the held motion.
 
-    Afterwards the control of the last cycle is still in effect, unless the hold was released for the stated reason.
+    On return, the control of the last cycle is still in effect, unless the hold was released for the stated reason.
     """
     phase: float | None = run.design.cycle_map.phase
     while True:
@@ -150,8 +152,8 @@ def capture_and_measure(run: "Hold", beta: float, report: Report) -> Generator[S
 def _released(
     sine: Sine, beta: float, drift: float, largest: float, cycles: int
 ) -> Generator[Step, Outcome, Rate | Fallen | None]:
-    """Rate at which a small deviation changes without control. `drift` [m] is the peak on the orbit; the first peak
-    above `largest` [m] ends the observation.
+    """Rate at which a small deviation changes without control; None if it was not observed. `drift` [m] is the peak on
+    the orbit; the first peak above `largest` [m] ends the observation.
     """
     yield Publish(StepStarted(f"beta = {beta:g} at {sine.omega:g} rad/s: released, observing the deviation"))
     found = list[Cycle]()
@@ -205,12 +207,12 @@ class Hold:
 
     @property
     def command(self) -> tuple[complex, ...]:
-        """Shares of the drive, including the latest control."""
+        """Harmonics of the drive as shares of the commanded amplitude, including the latest control."""
         first, *others = self.shares
         return (first + self._controls[-1] / self._table.answer, *others)
 
     def push(self, cycle: Cycle | None) -> str | None:
-        """Determine the next control from a cycle, which is None if it was lost; returns the reason to release the
+        """Compute the next control from a cycle, or from None if the cycle was lost; returns the reason to release the
         hold, if any.
         """
         y = None if cycle is None else observed(cycle, self._table.turn)

@@ -12,7 +12,7 @@ CYCLES = 220
 
 
 class Pace:
-    """Progress, computed from the expected durations of the finished and the remaining tests on the bench."""
+    """Progress of a campaign, computed from the expected durations of all tests and of the finished ones."""
 
     def __init__(self, omegas: tuple[float, ...], tests_per_omega: int) -> None:
         self._total = tests_per_omega * sum(self._expected(omega) for omega in omegas)

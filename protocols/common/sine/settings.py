@@ -4,7 +4,7 @@ from sim.parameters import Parameters, quantity
 
 
 class SineParameters(Parameters):
-    """Settings that steady sine tests have in common."""
+    """Settings common to all steady sine tests."""
 
     amplitude_tolerance: float = quantity(
         0.001, "1", "largest relative error of the table's amplitude at which a point is measured", gt=0, le=0.1
@@ -31,7 +31,7 @@ class SineParameters(Parameters):
         gt=0,
         lt=1,
     )
-    ramp_time: float = quantity(8.0, "s", "duration of the ramp that starts the bare frame", gt=0, le=120)
+    ramp_time: float = quantity(8.0, "s", "duration of the ramp that starts a test of the bare frame", gt=0, le=120)
     settle_tolerance: float = quantity(
         0.002, "1", "largest remaining relative change of a channel that is considered steady", gt=0, le=0.1
     )

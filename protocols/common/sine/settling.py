@@ -22,8 +22,7 @@ INTERVAL = 6
 """Number of cycles between checks of the table's motion and of steadiness."""
 
 TRANSIENT = 2
-"""Number of cycles discarded at the start of an interval, in which the preceding correction of the drive takes effect.
-"""
+"""Number of cycles discarded at the start of an interval, while the preceding correction of the drive takes effect."""
 
 AIM = 0.5
 """Fraction of the tolerances to which the table is corrected; the rest allows for disturbances by a block that has not
@@ -33,8 +32,8 @@ settled.
 
 @dataclass(frozen=True)
 class TableState:
-    """Sine of the table at the end of a dwell: its `turn` (see `Sine.turn`), the `shares` of its drive, and `answer`,
-    the ratio of the achieved share of the fundamental to the share in the drive.
+    """Sine of the table at the end of a dwell: its `turn` (see `Sine.turn`), the harmonics of its drive as `shares` of
+    the commanded amplitude, and `answer`, the ratio of the achieved fundamental to that in the drive.
     """
 
     turn: complex
@@ -46,7 +45,7 @@ class TableState:
 class Settled:
     """A measured dwell: its peak, its steadiness, and its settling `time` [s]. `amplitude_error` (relative) and
     `phase_error` [rad] are errors of the table, after `updates` corrections of its drive. `motion` describes an
-    unsteady motion; if this revolves about a periodic motion, `orbit` is the peak of its mean cycle. `table` is the
+    unsteady motion; if that revolves about a periodic motion, `orbit` is the peak of its mean cycle. `table` is the
     state of the table at the end of the dwell, None if unknown.
     """
 
@@ -109,7 +108,7 @@ def settle_and_measure(
     """Hold the table at `sine` until every signal is steady, then measure.
 
     A motion that is not steady within the settle limit is measured as modulated. In a test of the bare frame, its model
-    `frame` checks the lasers.
+    `frame` is used to check the lasers.
     """
     detector = SteadyDetector(parameters.settle_tolerance, JUDGED, LASERS, sine.omega * accuracy.laser_timing)
     control = SineControl(
@@ -140,7 +139,7 @@ def settle_and_measure(
         # the first cycles after a correction of the drive are transient
         constant.extend(outcome.cycles if constant or not updates else outcome.cycles[TRANSIENT:])
         if ready:
-            # twice the tolerance is allowed here, since noise would decide at the tolerance itself
+            # twice the tolerance is allowed, since at the tolerance itself noise would decide the verdict
             steadiness = detector.judge(allowance=2.0)
             if steadiness.steady or over:
                 used = outcome.cycles[-parameters.measured_cycles :]
@@ -169,16 +168,16 @@ def settle_and_measure(
 
 
 def linear_frame(configuration: BenchConfiguration) -> LinearFrame:
-    """Model of the bare frame, with which its tests check the lasers."""
+    """Model of the bare frame, used in its tests to check the lasers."""
     grounded = configuration.laser_reference == "ground"
     return LinearFrame(configuration.known_specimen.bare(), grounded)
 
 
 def checked(sensors: SensorUncertainty, references: Iterable[Settled]) -> SensorUncertainty:
-    """`sensors` with the checks of the lasers' linearity from the steady tests of the bare frame."""
+    """`sensors`, extended by the checks of the lasers' linearity from the steady tests of the bare frame."""
     return replace(sensors, checks=tuple(each.peak.checks for each in references if each.peak.checks is not None))
 
 
 def preceding(constant: Sequence[Cycle], used: Sequence[Cycle]) -> Sequence[Cycle]:
-    """The cycles in `constant`, all at the same drive, that precede the `used` ones at its end."""
+    """The cycles before the `used` ones, which end the sequence `constant` of cycles at the same drive."""
     return constant[: -len(used)][-PRECEDING:]

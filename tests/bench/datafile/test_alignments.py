@@ -24,8 +24,8 @@ def test_alignments_come_back_exactly_by_run(tmp_path: Path) -> None:
         assert kept.alignments == {1: (FIRST, SECOND), 3: (SECOND,)}
         (first, _) = [event for event in kept.events if event.kind == "SensorsAligned"]
         assert first.text == (
-            "storey 1: clock +30.0 ppm, readings within 2 us, 120000 values, 3 lost;"
-            " storey 2: clock -21.0 ppm, readings within 1 us, 119990 values, 0 lost"
+            "storey 1: clock +30.0 ppm, rms residual 2 us, 120000 values, 3 lost;"
+            " storey 2: clock -21.0 ppm, rms residual 1 us, 119990 values, 0 lost"
         )
 
 

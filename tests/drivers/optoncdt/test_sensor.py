@@ -100,7 +100,7 @@ def test_a_fast_sensor_on_the_factorys_baud_rate_sends_its_counter_only() -> Non
             InvalidInput,
             r"hardware\.lasers\.rate = 4000\.0 is refused: .* measures at 2000 1/s instead",
         ),
-        ([*OPENED[:5], (b"MEASRATE", b"MEASRATE fast\r\n->")], RigError, r"does not report its rate \('FAST'\)"),
+        ([*OPENED[:5], (b"MEASRATE", b"MEASRATE fast\r\n->")], RigError, r"reports an unreadable rate \('FAST'\)"),
         (
             replaced(OPENED, TRIGGER=b"TRIGGER E202 Access denied\r\n->"),
             CommandRefused,
@@ -160,7 +160,7 @@ def test_the_baud_rate_is_searched_for(noise: bytes) -> None:
 def test_a_baud_rate_that_is_not_the_sensors_is_refused() -> None:
     with (
         Peer(SILENCED, baud=1_000_000) as peer,
-        pytest.raises(InvalidInput, match=r"hardware\.laser_1\.baud = 921600 .* responds at 1000000: set"),
+        pytest.raises(InvalidInput, match=r"hardware\.laser_1\.baud = 921600 .* responds at 1000000 baud: set"),
     ):
         opened(peer.path)
 

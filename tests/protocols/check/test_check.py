@@ -172,6 +172,6 @@ def test_the_text_names_the_remedy_below_a_failed_line(tmp_path: Path, capsys: p
     lines = captured.out.splitlines()
     at = next(number for number, line in enumerate(lines) if line.startswith("FAILED"))
     assert "laser_2" in lines[at]
-    assert "-> beyond its" in lines[at + 1]
+    assert "-> beyond the" in lines[at + 1]
     assert "6 passed, 1 failed, 1 untested." in captured.out
     assert "FAILED: laser_2, valid samples at rest" in captured.err

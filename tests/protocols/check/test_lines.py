@@ -209,7 +209,7 @@ def test_values_that_did_not_arrive_are_not_blamed_on_the_target(mark: int, word
 def test_a_channel_at_its_rail_fails(count: int, end: str) -> None:
     lines = rest(table_displacement=np.full(1000, count))
     assert failures(lines) == [("table_displacement", "valid samples at rest")]
-    assert f"beyond its {end} end" in next(line.remedy for line in lines if line.remedy)
+    assert f"beyond the {end} end of its range" in next(line.remedy for line in lines if line.remedy)
 
 
 @pytest.mark.parametrize("name", ["table_displacement", "coil_current"])

@@ -116,7 +116,7 @@ def test_every_combination_has_a_point_and_a_spring_without_a_record_is_not_moun
     ]
     assert points[0].reason == "omitted, since it would exceed a limit: drift"
     assert points[2].reason == "refused by the table"
-    assert "0 of 0 runs toppled" in earthquake_table(points)
+    assert "the block toppled: 0 of 0" in earthquake_table(points)
 
 
 def test_a_file_without_the_table_leaves_nothing_out(campaign: EarthquakeCampaign) -> None:
