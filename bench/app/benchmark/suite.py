@@ -191,6 +191,12 @@ def _members(scale: Scale) -> Section:
     return members(scale.repetitions)
 
 
+def _arithmetic(scale: Scale) -> Section:
+    from bench.app.benchmark.arithmetic import arithmetic
+
+    return arithmetic(scale.repetitions)
+
+
 def _commands(scale: Scale) -> Section:
     from bench.app.benchmark.commands import commands
 
@@ -203,6 +209,7 @@ PARTS: dict[str, Callable[[Scale], Section]] = {
     "gain_map": _gain_map,
     "records": _records,
     "members": _members,
+    "arithmetic": _arithmetic,
     "streaming": _streaming,
     "scaling": _scaling,
     "startup": _startup,
