@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MARGIN = 1.05
-"""Factor on the requested amplitude; the larger amplitude must also be within the limits."""
+"""Safety factor: this multiple of the requested amplitude must be within the limits."""
 
 _COLUMNS = (
     TextColumn("sensor", words=True),
@@ -55,8 +55,8 @@ _UNCLAMP = "Remove the clamps from the storeys."
 
 
 class LaserCalibrationRun(Prepared[LaserCalibrationParameters]):
-    """Laser calibration. Raises InvalidInput for lasers that do not measure the table, and for motions beyond
-    limits.
+    """Laser calibration. Raises InvalidInput for lasers mounted on the table, a configuration that already includes a
+    calibration, and motions beyond the limits.
     """
 
     def __init__(
@@ -70,7 +70,7 @@ class LaserCalibrationRun(Prepared[LaserCalibrationParameters]):
             raise InvalidInput(
                 "lasers.reference",
                 "table",
-                "lasers on the table do not measure its motion: mount both on the ground, and set this to ground",
+                "lasers mounted on the table do not measure its motion: mount both on the ground, and set ground here",
             )
         if configuration.calibrated is not None:
             raise InvalidInput(
