@@ -116,7 +116,7 @@ class LaserCalibrationRun(Prepared[LaserCalibrationParameters]):
 
     @cached_property
     def prediction(self) -> Table:
-        """Planned passes."""
+        """Circular frequencies and amplitudes of the planned passes."""
         omega, amplitude = np.array(planned_passes(self.parameters)).T
         return {
             "omega": Column(omega, "rad/s", "circular frequency of each pass"),
@@ -129,7 +129,7 @@ class LaserCalibrationRun(Prepared[LaserCalibrationParameters]):
 
     def _steps(self) -> Generator[Step, Outcome, None]:
         """Steps: clamp the storeys to the table, measure, publish, remove the clamps. Raises Unmeasurable, after the
-        clamps are removed, if the response is insufficient.
+        clamps are removed, if the measurement fails.
         """
         bare = self.configuration.known_specimen.bare()
         yield OperatorAction(OperatorTask.LOCK_FRAME, bare, _CLAMP)
@@ -180,7 +180,7 @@ def _fit_event(name: str, curve: ErrorCurve, delay: float, uncertainty: float) -
 
 
 def _calibrated_sensors(found: LaserCalibration) -> Iterator[CalibratedSensor]:
-    """One result for each sensor, and one for the ratio of the lasers."""
+    """Results of both lasers, of their ratio, and of both sensors of the table."""
     for name, laser in (("laser_1", found.laser_1), ("laser_2", found.laser_2)):
         at = np.linspace(laser.lowest, laser.highest, 201)
         error = at - laser.corrected(at)

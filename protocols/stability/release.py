@@ -1,4 +1,4 @@
-"""Release of a held motion: a deflection along the slowest pair of multipliers, and the free cycles after it."""
+"""Release of a held motion: a deflection along the dominant pair of multipliers, and the free cycles after it."""
 
 from collections.abc import Generator
 from dataclasses import dataclass
@@ -19,8 +19,8 @@ from sim.cycle_map import CycleMap
 Array = NDArray[np.float64]
 
 DEFLECTION = 8
-"""Number of cycles in which the motion is deflected. At least as many controls as half the states of table and
-specimen are required to leave the other multipliers unexcited; a larger number permits smaller controls.
+"""Number of cycles in which the motion is deflected. At least half as many controls as the table and the specimen
+have states are required to leave the other multipliers unexcited; a larger number permits smaller controls.
 """
 
 START, LEAST = 0.7, 0.02
@@ -48,7 +48,7 @@ class Released:
 def deflection(found: CycleMap, cycles: int, authority: float) -> NDArray[np.complex128]:
     """Controls of the cycles before a release, shape (DEFLECTION,), of at most `authority`.
 
-    The deviation at the release is such that it remains linear for about `cycles` cycles.
+    The deviation at the release is chosen so that the motion remains linear for about `cycles` cycles.
     """
     controls, effect = found.excitation(DEFLECTION)
     share = np.clip(abs(found.slowest) ** -float(cycles), LEAST / BOUND, START)
