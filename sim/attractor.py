@@ -31,8 +31,8 @@ DISTURBANCE = 0.1
 """Relative disturbance of the block's angle at the start."""
 
 CONTROLLED, SHARE = 36, 0.5
-"""Number of cycles between corrections of the drive, and the fraction of the error in the table's mean harmonics that
-each corrects.
+"""Number of cycles between corrections of the drive, and the fraction of the error of the table's mean harmonics
+removed by each.
 """
 
 REPEATED, ALIKE = 0.01, 0.05
@@ -62,8 +62,8 @@ class Attractor:
 def attractor(specimen: Specimen, shaker: Shaker, orbit: TableOrbit, cycles: int = 1500) -> Attractor:
     """Long-term motion of `specimen` on the table of `shaker`, `cycles` cycles after a start on the disturbed `orbit`.
 
-    The drive is initially that of the orbit, which may be the orbit of a similar specimen, and keeps the table's mean
-    harmonics at those of the orbit.
+    The drive is initially that of the orbit, which may be the orbit of a similar specimen. It is then corrected so that
+    the table's mean harmonics remain those of the orbit.
     """
     from sim.kernel.plant import FALLEN
 

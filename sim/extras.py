@@ -12,7 +12,7 @@ EXTRAS = {
     "pdf": ("typst",),
     "distributed": ("distributed",),
 }
-"""Packages of each extra of `pyproject.toml` that this software imports."""
+"""Imported packages of each extra in `pyproject.toml`."""
 
 
 class MissingExtra(InvalidInput):

@@ -76,7 +76,7 @@ def release(
         outcome = yield Dwell(1)
         if not isinstance(outcome, Measured):
             return Fallen()
-        # a correction takes effect one cycle after the one that is measured next
+        # a control that is set before a cycle takes effect in the following cycle
         played = abs(controls[number - 1]) if 0 < number <= len(controls) else 0.0
         for cycle in outcome.cycles:
             y = observed(cycle, table.turn)
@@ -87,14 +87,14 @@ def release(
             if deviation > LOST * BOUND or drift > largest:
                 return Released(np.array(rows).reshape(-1, orbit.size), orbit)
         if not outcome.cycles and number > len(controls):
-            # the fit requires successive cycles
+            # the fit requires consecutive cycles
             break
     return Released(np.array(rows).reshape(-1, orbit.size), orbit)
 
 
 def parts_of(found: Multiplier, amplitude_slope: float, table_scale: float) -> dict[str, float]:
-    """Standard uncertainties of the modulus by contribution, largest first: noise of the cycles, and the amplitude of
-    the table, of which `table_scale` is the relative standard uncertainty. The latter is 0 for an unknown slope (NaN).
+    """Standard uncertainties of the modulus by contribution, largest first: scatter of the cycles, and amplitude of the
+    table with the relative standard uncertainty `table_scale`. The second is 0 for an unknown `amplitude_slope` (NaN).
     """
     slope = 0.0 if amplitude_slope != amplitude_slope else abs(amplitude_slope)
     parts = {
