@@ -24,13 +24,13 @@ from sim.specimen import Block, Frame, Specimen
 from sim.steady import NoOrbit, Orbit, resting_state, rocking_orbit
 
 STEP = 3e-5
-"""Step of the finite differences, of fourth order, relative to the parameter; absolute for a parameter that is zero."""
+"""Step of the fourth-order finite differences, relative to the parameter; absolute for a parameter that is zero."""
 
 TOLERANCE = 1e-13
 """Integration tolerance of the runs from which finite differences are computed."""
 
 SAMPLES, ZOOMS = 401, 2
-"""Samples of each search for a peak, and number of successive refinements."""
+"""Number of samples in each search for a peak, and number of successive refinements."""
 
 Floats = NDArray[np.float64]
 

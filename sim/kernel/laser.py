@@ -1,4 +1,4 @@
-"""Free-running laser: it measures between the ticks, and each tick samples its latest output.
+"""Free-running laser: it is not synchronised with the ticks, each of which samples its latest output.
 
 Measurement k is taken at tick (k + phase) / per_tick, a real number, and is output `latency` measurements later.
 """
@@ -19,7 +19,7 @@ its periods in the range [1] and their phase [rad], number of steps of the outpu
 @compiled("float64(float64, float64[::1])")
 def output(displacement: float, constants: NDArray[np.float64]) -> float:
     """Voltage [V] across the load at a displacement [m] from mid range: 4 to 20 mA with a reserve of 1 % at both ends,
-    and the error current beyond it.
+    and the error current beyond this range.
     """
     place = displacement / constants[RANGE]
     share = 0.5 + constants[GAIN] * place
