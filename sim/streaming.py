@@ -56,7 +56,7 @@ class Stream:
         check_options(tolerance, overturning_angle)
         check_state(specimen, start, overturning_angle)
         if not (dt > 0.0 and isfinite(dt)):
-            raise InvalidInput("dt", dt, "it must be a positive time in s")
+            raise InvalidInput("dt", dt, "it must be a positive, finite time step in s")
         if divisions < 0:
             raise InvalidInput("divisions", divisions, "it must be 0 or more samples per interval")
         if peaks_from is not None and not peaks_from >= 0.0:
@@ -87,7 +87,7 @@ class Stream:
 
     @property
     def status(self) -> Status:
-        """COMPLETED while the run continues."""
+        """Status of the run: COMPLETED while it continues."""
         return self.motion().status
 
     def motion(self) -> Motion:
