@@ -74,5 +74,5 @@ class Shaker(Parameters):
         return np.asarray(self.force_per_volt * s * s / (impedance * (1.0 + self.amplifier_lag * s)), np.complex128)
 
     def drive_for(self, acceleration: float, omega: float, payload: float = 0.0) -> float:
-        """Drive amplitude [V] for a sine with the amplitude `acceleration` [m/s2] at `omega` [rad/s] (linear response)."""
+        """Drive amplitude [V] for a sine of amplitude `acceleration` [m/s2] at `omega` [rad/s]; linear response."""
         return acceleration / float(np.abs(self.frequency_response(omega, payload)))
