@@ -1,7 +1,7 @@
 """Linear map from cycle to cycle near a steady rocking motion, with the fundamental of the drive as its input.
 
-Cycle n lasts from one section to the next. At its beginning, the state deviates from the orbit by x_n, shape (8,). In
-its first part, the control changes smoothly from c_(n-1) to c_n. A control is a complex number relative to the
+Cycle n lasts from one Poincaré section to the next. At its beginning, the state deviates from the orbit by x_n, shape
+(8,). In its first part, the control changes smoothly from c_(n-1) to c_n. A control is a complex number relative to the
 amplitude of the table's acceleration, written as a vector of its real and imaginary parts. With y_n, the Fourier
 coefficients of u1 and drift over the cycle,
 

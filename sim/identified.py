@@ -70,7 +70,9 @@ def _canonical(name: str) -> str:
 class Finding(Parameters):
     """One measured quantity of the specimen."""
 
-    name: str = quantity(..., "", "name of the quantity: m1, m2, k1, k2, xi1, xi2, restitution_factor, or k_c:LABEL")
+    name: str = quantity(
+        ..., "", "name of the quantity: m1, m2, k1, k2, xi1, xi2, restitution_factor, or k_c:LABEL (spring)"
+    )
     value: float = quantity(..., "", "best estimate, in the quantity's SI unit", ge=0)
     standard_uncertainty: float = quantity(..., "", "standard uncertainty (k = 1), in the quantity's SI unit", ge=0)
     source: str = quantity(..., "", "source of the value")

@@ -95,7 +95,7 @@ class Stream:
         return motion_of(self._report, self._x, None, watched=self._watched)
 
     def feed(self, acceleration: ArrayLike) -> NDArray[np.float64]:
-        """Advance through the next values [m/s2], shape (n,), any n. Returns the states evaluated, shape (m, 6).
+        """Advance through the next values [m/s2], shape (n,), any n. Returns the evaluated states, shape (m, 6).
 
         m is `divisions` times the number of completed intervals; the columns are those of `State.as_array`. There are
         no rows after an overturning or a failure, which `status` reports; later input is ignored.

@@ -204,6 +204,6 @@ def _released_decays(
         signals = yield from record(silence, setting.sample_rate, pace, activity)
         return released_decay(signals, setting)
 
-    how = f"released by hand, {window:.0f} s"
+    how = f"release by hand, decay of {window:.0f} s"
     planned = RELEASE + window + WAITING
     return (yield from repeat_decays(parameters, setting, pace, planned, once, "free vibration", how))

@@ -270,7 +270,7 @@ def _remarks(
 ) -> Iterator[str]:
     state, peak = settled.steadiness, settled.peak
     if not state.steady:
-        yield f"not steady after {settled.time:.0f} s: {_described(settled)}, spread {100.0 * state.spread:.1f} %"
+        yield f"not steady after {settled.time:.0f} s: {_described(settled)}, cycle spread {100.0 * state.spread:.1f} %"
         if on_table is not None:
             yield f"disturbances of the predicted orbit {_growth(branches[_ROCKING].multiplier, on_table)}"
         if orbit:

@@ -112,7 +112,7 @@ class StabilityPoint(Parameters):
     autocorrelation: float | None = quantity(
         None, "1", "correlation of the residuals of successive cycles; near 0 if the fit describes the motion"
     )
-    residual_m: float | None = quantity(None, "m", "rms residual of a Fourier coefficient of u1 or drift")
+    residual_m: float | None = quantity(None, "m", "rms residual of the fitted Fourier coefficients of u1 and drift")
     drift_peak_m: float | None = quantity(None, "m", "peak drift of the held orbit")
     amplitude_m_s2: float | None = quantity(None, "m/s2", "achieved amplitude of the table on the held orbit")
     amplitude_slope: float | None = quantity(
