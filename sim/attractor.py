@@ -17,7 +17,7 @@ from sim.table_orbit import TableOrbit, TablePeriod, corner, harmonics_of
 Array = NDArray[np.float64]
 
 TICKS, SUBSTEPS = 400, 1
-"""Number of intervals of constant drive per period, and of Runge-Kutta steps in each. The greatest peak differs by at
+"""Number of intervals of constant drive per period, and Runge-Kutta steps in each. The greatest peak differs by at
 most 0.2 % from that with 600 intervals of two steps, less than between two parts of a motion that does not repeat.
 """
 

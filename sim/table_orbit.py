@@ -23,7 +23,7 @@ from sim.steady import NoOrbit, Orbit, slowest_of
 Array = NDArray[np.float64]
 
 TICKS, SUBSTEPS = 600, 2
-"""Number of intervals of constant drive per period, and of Runge-Kutta steps in each; multiplier error 4e-5."""
+"""Number of intervals of constant drive per period, and Runge-Kutta steps in each; multipliers are accurate to 4e-5."""
 
 STEP = 1e-5
 """Step of the finite differences, relative to the scale of each state."""
