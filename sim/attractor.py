@@ -1,8 +1,8 @@
 """Long-term motion of a specimen on the table of a bench: a periodic orbit, a torus, or a fall.
 
 Where the orbit of one period is unstable, disturbances grow until the motion repeats after several periods, does not
-repeat at all, or the block falls. The motion is integrated from a disturbed orbit under a drive that keeps the mean of
-the table's harmonics at their requested values, as a slow amplitude control does.
+repeat at all, or the block falls. The motion is integrated from a disturbed orbit under a drive that keeps the table's
+mean harmonics at their requested values, as a slow amplitude control does.
 """
 
 from dataclasses import dataclass

@@ -62,7 +62,7 @@ class CycleMap:
 
     @property
     def sensitive(self) -> complex:
-        """Control of unit magnitude, in a single cycle, that most excites the slowest pair of multipliers."""
+        """Control of unit magnitude, in a single cycle, that most excites the dominant pair of multipliers."""
         multipliers, vectors = np.linalg.eig(self.transition)
         at = int(np.argmax(np.abs(multipliers)))
         before, now = self.inputs
@@ -71,7 +71,7 @@ class CycleMap:
         return complex(directions[0, 0], directions[0, 1])
 
     def excitation(self, cycles: int) -> tuple[NDArray[np.complex128], float]:
-        """Controls of successive cycles, shape (cycles,), after which the state deviates along the slowest pair only.
+        """Controls of successive cycles, shape (cycles,), after which the state deviates along the dominant pair only.
 
         The largest control has the magnitude 1. Also returns the relative deviation of y that these controls cause. The
         phase of the deviation is chosen for the smallest controls.

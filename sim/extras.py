@@ -1,4 +1,4 @@
-"""Optional dependencies: the extras of the installation, and a check that one of them is installed."""
+"""Optional dependencies: the extras of the installation, and a check that an extra is installed."""
 
 from importlib.util import find_spec
 

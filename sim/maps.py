@@ -52,7 +52,7 @@ class BranchMap:
 
     @cached_property
     def multiplier(self) -> Floats:
-        """Greatest |Floquet multiplier|, shape (n, m)."""
+        """Modulus of the dominant Floquet multiplier, shape (n, m)."""
         return np.abs(self.multipliers).max(axis=2)
 
     @property

@@ -35,7 +35,7 @@ LEFT = 1e-3
 
 FEWEST_ROUNDS, MOST_ROUNDS = 10, 100
 """Minimum and maximum number of rounds, of WINDOW periods each, for which an undecided motion is continued; the minimum
-applies without a stable orbit.
+applies without a stable rocking orbit.
 """
 
 StartProgram = Callable[[float, float], SineProgram]

@@ -1,6 +1,6 @@
 """Motion under a base acceleration that arrives in blocks, as from a live bench.
 
-The result is bit-identical for any division into blocks, because all state that affects a step is kept between them.
+The result is bit-identical for any division into blocks, because all state that affects a step is kept between blocks.
 """
 
 from math import isfinite, pi

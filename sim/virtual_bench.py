@@ -197,7 +197,9 @@ class VirtualBench:
         """
         catch = self.parameters.catch_angle
         if abs(arrangement.tilt) >= catch:
-            raise InvalidInput("tilt", arrangement.tilt, f"it must be below the catch angle of {catch:g} rad")
+            raise InvalidInput(
+                "tilt", arrangement.tilt, f"its magnitude must be below the catch angle of {catch:g} rad"
+            )
         self._arrange(arrangement)
         self._held_for = None
         self._state[1:] = 0.0

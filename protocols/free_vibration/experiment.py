@@ -66,7 +66,7 @@ STILL_LOCKED = "THE TABLE IS STILL LOCKED: remove the clamp before the table is 
 
 class FreeVibration(Prepared[FreeVibrationParameters]):
     """Identification of the frame. Raises InvalidInput for a pulse or an initial displacement outside the limits of the
-    bench, or for mass uncertainties although the specimen file states the masses.
+    bench, or for mass uncertainties if the specimen file contains the masses.
     """
 
     def __init__(
@@ -168,7 +168,7 @@ def _check_pull(parameters: FreeVibrationParameters, configuration: BenchConfigu
         *(0.5 * SHARE * min(configuration.limits.laser_range, 1.0) * half for half in configuration.laser_half_ranges),
     )
     if not LEAST <= parameters.pull <= room:
-        allowed = f"it must be {LEAST:g} to {room:.3g} m: limits.drift and the lasers' ranges allow no more"
+        allowed = f"it must be {LEAST:g} to {room:.3g} m, as limited by limits.drift and the lasers' ranges"
         raise InvalidInput("pull", parameters.pull, allowed)
 
 

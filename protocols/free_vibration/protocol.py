@@ -14,7 +14,7 @@ class FreeVibrationParameters(DecayParameters):
     """Free decays of the bare frame after a pulse of the table, or after a release by hand on a locked table."""
 
     excitation: Literal["pulse", "hand"] = quantity(
-        "pulse", "", "excitation: pulse: short motion of the table; hand: release of storey 2 by hand"
+        "pulse", "", "excitation: pulse (short motion of the table) or hand (release of storey 2 by hand)"
     )
     pull: float = quantity(0.020, "m", "displacement of storey 2 before the release by hand", gt=0, le=0.2)
 

@@ -50,7 +50,7 @@ def _frame_text(points: list[dict[str, Any]]) -> Part:
     )
     birge = together[-1]["birge"] if together else None
     if birge is not None:
-        text += f" The largest Birge ratio is {birge:.2f}: the scatter of the decays relative to their uncertainties."
+        text += f" The scatter of the decays, relative to their uncertainties (Birge ratio), is at most {birge:.2f}."
     return text
 
 

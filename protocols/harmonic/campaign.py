@@ -113,7 +113,7 @@ class HarmonicCampaign(Prepared[HarmonicParameters]):
         """Peak displacements of the storeys, as the lasers measure them, and peak drift [m], in the steady state at
         `omega` [rad/s].
 
-        The motion is that of the bare frame if `beta` is None, otherwise the rocking motion; None if it has no orbit.
+        The motion is that of the bare frame if `beta` is None, otherwise the rocking motion; None without an orbit.
         """
         if (beta, omega) not in self._motions:
             grounded = self.configuration.laser_reference == "ground"
@@ -201,7 +201,7 @@ def gain_spectra(parameters: HarmonicParameters, specimen: Specimen, known: Spec
     return {
         "omega": Column(np.array(omega), "rad/s", "circular frequency of the base motion"),
         "beta": Column(np.array(beta), "1", "stiffness ratio of the coupling spring"),
-        "alpha_1": Column(np.array([branch.alpha_1 for branch in branches]), "1", "gain of the peak u1 of storey 1"),
+        "alpha_1": Column(np.array([branch.alpha_1 for branch in branches]), "1", "gain of the peak displacement u1"),
         "alpha_2": Column(alpha_2, "1", "gain of the peak drift"),
         "alpha_2_uncertainty": Column(
             band.uncertainty, "1", "expanded uncertainty of alpha_2 (k = 2) due to the specimen"

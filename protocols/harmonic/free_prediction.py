@@ -18,7 +18,7 @@ MEMBERS = 8
 def with_free_prediction(
     point: HarmonicPoint, specimen: Specimen, amplitude: float, configuration: BenchConfiguration, harmonics: int
 ) -> HarmonicPoint:
-    """A point with the prediction of its unsteady free motion at `amplitude` [m/s2] added.
+    """Add to a point the prediction of its unsteady free motion at `amplitude` [m/s2].
 
     Other points are unchanged. Nothing is added without a model of the table, or where disturbances of the orbit decay,
     since the free motion then tends to the orbit.

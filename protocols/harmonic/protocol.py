@@ -155,7 +155,7 @@ class HarmonicPoint(Parameters):
     bare_amplitude_m_s2: float | None = quantity(None, "m/s2", "achieved amplitude of the table, bare frame")
     amplitude_error: float | None = quantity(None, "1", "relative error of the table's amplitude, coupled frame")
     phase_error_rad: float | None = quantity(
-        None, "rad", "phase lead of the table relative to the oscillator, coupled frame"
+        None, "rad", "phase lead of the table relative to the drive oscillator, coupled frame"
     )
     table_harmonics: float | None = quantity(
         None,

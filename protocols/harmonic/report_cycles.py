@@ -39,7 +39,7 @@ PERIODS, SAMPLES = 3, 120
 """Number of periods of the drive that are drawn, and number of points per curve and period."""
 
 QUIET = 1.5
-"""Initial part of a run, with the table at rest, from which the signals are zeroed [s]; the rest lasts 2 s."""
+"""Time at the start of a run from which the signals are zeroed [s]; the table does not move for the first 2 s."""
 
 BOUNDARIES = ("StepStarted", "StateChanged")
 """Events that end a dwell."""

@@ -49,7 +49,7 @@ _COLUMNS = (
 )
 
 _CLAMP = (
-    "Remove spring and block from the table and clamp both storeys to it. Keep clear: the amplifier will be enabled."
+    "Remove the spring and the block, and clamp both storeys to the table. Keep clear: the amplifier will be enabled."
 )
 _UNCLAMP = "Remove the clamps from the storeys."
 
@@ -70,7 +70,7 @@ class LaserCalibrationRun(Prepared[LaserCalibrationParameters]):
             raise InvalidInput(
                 "lasers.reference",
                 "table",
-                "lasers mounted on the table do not measure its motion: mount both on the ground, and set ground here",
+                "lasers on the table do not measure its motion: mount both on the ground, and set this key to ground",
             )
         if configuration.calibrated is not None:
             raise InvalidInput(
