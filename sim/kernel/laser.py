@@ -12,7 +12,8 @@ from sim.kernel.compiled import compiled
 
 RANGE, GAIN, LINEARITY, WAVES, WAVE_PHASE, STEPS, LOAD, ERROR_CURRENT = range(8)
 """Indices of the constants: measuring range [m], sensitivity relative to nominal [1], linearity error [1], number of
-its periods in the range [1] and their phase [rad], number of steps of the output [1], load [ohm], error current [A].
+periods of this error in the range [1] and their phase [rad], number of steps of the output [1], load [ohm], error
+current [A].
 """
 
 
@@ -54,7 +55,7 @@ def measure(
     noise : shape (m,), error [m] of each of the m new measurements up to the last tick.
     x, v : shape (n,), position [m] and velocity [m/s] of the target at the ticks, interpolated by cubic Hermite curves.
     last : shape (2,), x and v at the previous tick, updated.
-    taken : shape (latency + 1,), the latest measurements [m], indexed by their number modulo its length, updated.
+    taken : shape (latency + 1,), the latest measurements [m], indexed by their number modulo this length, updated.
     """
     depth, used = taken.size, 0
     for i in range(x.size):

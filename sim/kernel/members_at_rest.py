@@ -59,8 +59,8 @@ def advance_with_rest(
                 specimen, table = specimens[specimen_of[j]], tables[lane]
                 length, found = segments[i, 0], MUST_STEP
                 places[ASKS, lane] = 0
-                # a table is computed at the second segment of equal length, because for one segment it would not pay; a
-                # negative length means that it has been computed
+                # the propagator is computed at the second segment of equal length, because its cost would not pay for
+                # a single one; a negative length means that it has been computed
                 if values[MET, lane] == length:
                     values[MET, lane] = -length
                     propagator(specimen, length, n, tolerance, table)

@@ -20,7 +20,7 @@ TABLE_ROWS = 9
 
 MUST_STEP, GLIDED, LOOK_INSIDE, ANOTHER_KIND = range(4)
 """Results of `glide`: the block may lift in the segment; all segments are taken; the block does not lift, but a peak
-may lie inside the segment; the segment is a sine or has another length.
+may be inside the segment; the segment is a sine or has another length.
 """
 
 

@@ -5,7 +5,7 @@ polynomials, so that they are as accurate as the step. In a phase that starts at
 out: the return to zero is found however short the phase, and a chattering block cannot pass through the ground.
 
 While the block rests under a record, whole segments are taken by the exact step of `sim.kernel.resting`; a Taylor
-polynomial is computed only where the block may lift or a requested value may lie inside the segment. Requests for peaks
+polynomial is computed only where the block may lift or a requested value may be inside the segment. Requests for peaks
 and samples do not affect the motion: they are evaluated on unchanged steps.
 """
 
@@ -120,8 +120,8 @@ def advance(
         row = segments[i]
         found = MUST_STEP
         if sg == 0.0 and row[1] == 0.0 and row[2] == 0.0 and row[3] == 0.0 and row[4] == 0.0:
-            # a table is computed at the second segment of equal length, because for one segment it would not pay; a
-            # negative length means that it has been computed
+            # the propagator is computed at the second segment of equal length, because its cost would not pay for a
+            # single one; a negative length means that it has been computed
             if kept[LENGTH] == row[0]:
                 kept[LENGTH] = -row[0]
                 propagator(p, row[0], n, tolerance, table)
