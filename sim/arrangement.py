@@ -21,9 +21,9 @@ Array = NDArray[np.float64]
 class Arrangement:
     """A specimen with its clamps and manual restraints.
 
-    `table_locked`: the table is clamped to the ground at mid stroke. `block_clamped`: the block is clamped to the table
-    and moves with it, and so does the end of the spring. `watched`: height [m] at which laser 2 measures the block's
-    face; None if it measures storey 2. `tilt`: rotation [rad] at which the block is held by hand; 0 if it is free.
+    `table_locked`: the table is clamped to the ground at mid stroke. `block_clamped`: the block is clamped to the
+    table; block and spring end move with the table. `watched`: height [m] at which laser 2 measures the block's face;
+    None if it measures storey 2. `tilt`: rotation [rad] at which the block is held by hand; 0 if it is free.
     `pull`: displacement [m] at which storey 2 is held by hand; 0 if it is free.
     """
 
@@ -44,7 +44,7 @@ class Arrangement:
         return replace(self, tilt=0.0, pull=0.0)
 
     def storeys(self) -> tuple[float, float]:
-        """Displacements (u1, u2) [m] of the storeys at rest, where u1 is due to the force that holds storey 2."""
+        """Displacements (u1, u2) [m] of the storeys at rest: storey 2 is held at `pull`, storey 1 is in equilibrium."""
         f = self.specimen.frame
         return f.k2 / (f.k1 + f.k2 + self.specimen.k_c) * self.pull, self.pull
 

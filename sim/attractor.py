@@ -1,8 +1,8 @@
 """Long-term motion of a specimen on the table of a bench: a periodic orbit, a torus, or a fall.
 
 Where the orbit of one period is unstable, disturbances grow until the motion repeats after several periods, does not
-repeat at all, or the block falls. The motion is integrated from a disturbed orbit under a drive that keeps the mean of
-the table's harmonics at their requested values, as a slow amplitude control does.
+repeat at all, or the block falls. The motion is integrated from a disturbed orbit under a drive that keeps the table's
+mean harmonics at their requested values, as a slow amplitude control does.
 """
 
 from dataclasses import dataclass
@@ -17,8 +17,8 @@ from sim.table_orbit import TableOrbit, TablePeriod, corner, harmonics_of
 Array = NDArray[np.float64]
 
 TICKS, SUBSTEPS = 400, 1
-"""Intervals of constant drive per period, and Runge-Kutta steps in each. The greatest peak differs by at most 0.2 %
-from that with 600 intervals of two steps, less than between two parts of a motion that does not repeat.
+"""Number of intervals of constant drive per period, and Runge-Kutta steps in each. The greatest peak differs by at
+most 0.2 % from that with 600 intervals of two steps, less than between two parts of a motion that does not repeat.
 """
 
 LONGEST_PERIOD = 24
@@ -31,8 +31,8 @@ DISTURBANCE = 0.1
 """Relative disturbance of the block's angle at the start."""
 
 CONTROLLED, SHARE = 36, 0.5
-"""Number of cycles between corrections of the drive, and the fraction of the error in the table's mean harmonics that
-each corrects.
+"""Number of cycles between corrections of the drive, and the fraction of the error of the table's mean harmonics
+removed by each.
 """
 
 REPEATED, ALIKE = 0.01, 0.05
@@ -62,8 +62,8 @@ class Attractor:
 def attractor(specimen: Specimen, shaker: Shaker, orbit: TableOrbit, cycles: int = 1500) -> Attractor:
     """Long-term motion of `specimen` on the table of `shaker`, `cycles` cycles after a start on the disturbed `orbit`.
 
-    The drive is initially that of the orbit, which may be the orbit of a similar specimen, and keeps the table's mean
-    harmonics at those of the orbit.
+    The drive is initially that of the orbit, which may be the orbit of a similar specimen. It is then corrected so that
+    the table's mean harmonics remain those of the orbit.
     """
     from sim.kernel.plant import FALLEN
 

@@ -1,6 +1,6 @@
 """Displacement measured by a horizontal laser on the face of the rotating stand-alone block.
 
-The beam is at height z above the table and hits the face towards the frame. A is the base corner below
+The beam is at height z above the table and hits the face nearest to the frame. A is the base corner below
 that face, and B is the other corner, 2b behind A. theta > 0 rotates the block about A, its top towards the frame; the
 face is a line through A, and the lit point moves by z tan(theta). theta < 0 rotates the block about B and lifts A: with
 the normal n = (cos, -sin)(theta), the points p of the face relative to B satisfy n p = 2b, and the beam meets the face
@@ -34,7 +34,7 @@ def displacement(theta: ArrayLike, height: float, block: Block) -> Array:
 
 
 def heights(theta: ArrayLike, block: Block) -> tuple[Array, Array]:
-    """Heights of the lowest and highest point of the face above the table [m] at rotations `theta` [rad], any shape."""
+    """Heights above the table [m] of the lowest and highest point of the face at rotations `theta` [rad], any shape."""
     angle = np.asarray(theta, dtype=np.float64)
     low = np.maximum(-2.0 * block.b * np.sin(angle), 0.0)
     return low, low + 2.0 * block.h_b * np.cos(angle)
@@ -49,8 +49,8 @@ def displacement_rate(theta: ArrayLike, height: float, block: Block) -> Array:
 
 
 def rotation(displacement: ArrayLike, height: float, block: Block) -> Array:
-    """Rotation [rad] of the block whose lit point is displaced by `displacement` [m], any shape; the inverse of the
-    function `displacement`.
+    """Rotation [rad] of the block from the displacement of the lit point [m], any shape; inverse of the function
+    `displacement`.
 
     About A, theta = atan(D / z). About B, |theta| is the solution of (D + 2b) cos|theta| + z sin|theta| = 2b, a
     difference of two angles in the right triangle with legs D + 2b and z. NaN where no rotation gives the displacement.

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 TABLE_DISPLACEMENT, TABLE_ACCELERATION = "table_displacement", "table_acceleration"
 TABLE_FORCE, COIL_CURRENT = "table_force", "coil_current"
 STOREYS = ("laser_1", "laser_2")
-"""Names of the channels by measured quantity, whatever the instrument: table and coil, first and second storey."""
+"""Names of the channels, independent of the instrument: table and coil, and the lasers at storeys 1 and 2."""
 
 Counts = NDArray[np.int16 | np.int32]
 """Array of a converter's counts: of 16-bit integers for most converters, of 32-bit integers for 24-bit ones."""
@@ -44,7 +44,7 @@ class Channel:
     delay_uncertainty: float = 0.0
 
     def to_unit(self, counts: Counts) -> NDArray[np.float64]:
-        """Convert counts to values in `unit`, same shape; NaN where the counts are not a measurement."""
+        """Convert counts to values in `unit`, same shape; NaN for counts outside `valid`."""
         values = self._converted(counts.astype(np.float64))
         values[(counts < self.valid[0]) | (counts > self.valid[1])] = np.nan
         return values

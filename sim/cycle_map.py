@@ -1,7 +1,7 @@
 """Linear map from cycle to cycle near a steady rocking motion, with the fundamental of the drive as its input.
 
-Cycle n lasts from one section to the next. At its beginning, the state deviates from the orbit by x_n, shape (8,). In
-its first part, the control changes smoothly from c_(n-1) to c_n. A control is a complex number relative to the
+Cycle n lasts from one Poincaré section to the next. At its beginning, the state deviates from the orbit by x_n, shape
+(8,). In its first part, the control changes smoothly from c_(n-1) to c_n. A control is a complex number relative to the
 amplitude of the table's acceleration, written as a vector of its real and imaginary parts. With y_n, the Fourier
 coefficients of u1 and drift over the cycle,
 
@@ -21,13 +21,13 @@ from sim.table_orbit import TICKS, TablePeriod, table_orbit
 Array = NDArray[np.float64]
 
 OBSERVED = 3
-"""Number of harmonics, of u1 and of the drift each, that the vector y contains."""
+"""Number of harmonics of u1, and of the drift, in the vector y."""
 
 STEP = 1e-4
-"""Step of the finite differences: for states relative to their scales, for the control as defined above."""
+"""Step of the finite differences: of states relative to their scales, and of the control relative to the amplitude."""
 
 RIGID = Shaker(moving_mass=1e8, friction=0.0, voltage_limit=1e12, current_limit=1e12)
-"""Shaker of a table that the block does not move."""
+"""Shaker with a table so heavy that the block does not move it."""
 
 TABLE = 2
 """Number of states of the table, which come first. They are omitted for a rigid table, because its free motion would
@@ -41,7 +41,7 @@ class CycleMap:
 
     States are relative to their scales on the orbit. Shapes: `transition` M (n, n), `inputs` B1, B0 (n, 2), `outputs` C
     (12, n), `feedthrough` D1, D0 (12, 2), `orbit` y* (12,) [m]; n is 8, or 6 on a rigid table. `blend` is the fraction
-    of a cycle in which the control changes. The order of the coefficients is that of `coefficients`.
+    of a cycle in which the control changes. The elements of y are ordered as by the function `coefficients`.
     """
 
     omega: float
@@ -62,7 +62,7 @@ class CycleMap:
 
     @property
     def sensitive(self) -> complex:
-        """Control of unit magnitude, in a single cycle, that most excites the slowest pair of multipliers."""
+        """Control of unit magnitude, in a single cycle, that most excites the dominant pair of multipliers."""
         multipliers, vectors = np.linalg.eig(self.transition)
         at = int(np.argmax(np.abs(multipliers)))
         before, now = self.inputs
@@ -71,10 +71,10 @@ class CycleMap:
         return complex(directions[0, 0], directions[0, 1])
 
     def excitation(self, cycles: int) -> tuple[NDArray[np.complex128], float]:
-        """Controls of successive cycles, shape (cycles,), after which the state deviates along the slowest pair only.
+        """Controls of successive cycles, shape (cycles,), after which the state deviates along the dominant pair only.
 
-        The largest control has the magnitude 1. Also returns the relative deviation of y that these controls cause. Its
-        phase is the one that is reached with the smallest controls.
+        The largest control has the magnitude 1. Also returns the relative deviation of y that these controls cause. The
+        phase of the deviation is chosen for the smallest controls.
         """
         multipliers, vectors = np.linalg.eig(self.transition)
         pair = vectors[:, int(np.argmax(np.abs(multipliers)))]

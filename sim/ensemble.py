@@ -48,7 +48,7 @@ def simulate_many(
 ) -> list[Motion]:
     """Results of `simulate` for many runs, in order, computed on all processors.
 
-    A single specimen, excitation, state or window applies to all runs. Everything is checked before the first run
+    A single specimen, excitation, state or `peaks_from` applies to all runs. Everything is checked before the first run
     starts. `scheduler` is that of `sim.sweep.sweep`.
 
     Raises InvalidInput if the sequences differ in length or a run is refused.
@@ -127,7 +127,7 @@ RUN_TOLERANCE = 1e-8
 """Integration tolerance of the runs under a record, far below the statistical error of an ensemble."""
 
 _Member = tuple[Orbit, Specimen]
-"""A specimen, and the known orbit at which the search for the specimen's orbit starts."""
+"""A known orbit, and the specimen whose orbit is searched for from there."""
 
 CHUNK = 500
 """Members integrated together: enough to share the overhead of a step, few enough to finish within a second."""

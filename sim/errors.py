@@ -25,7 +25,7 @@ class CauseCode(StrEnum):
 
 
 class Interruption(Exception):
-    """Ends a run early. Any code may raise it; it does not indicate an error in that code."""
+    """Exception that ends a run early; it does not indicate an error in the code that raises it."""
 
 
 @dataclass(frozen=True)

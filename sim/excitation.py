@@ -57,17 +57,17 @@ class Sweep:
         return (self.omega[1] - self.omega[0]) / self.duration
 
     def amplitude_at(self, t: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Amplitude at times since the sweep's start [m/s2]; constant beyond its ends."""
+        """Amplitude [m/s2] at the times `t` [s] since the start of the sweep; constant outside the sweep."""
         x = np.clip(t / self.duration, 0.0, 1.0)
         return self.amplitude[0] + (self.amplitude[1] - self.amplitude[0]) * x * x * (3.0 - 2.0 * x)
 
     def omega_at(self, t: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Circular frequency at times since the sweep's start [rad/s]; constant beyond its ends."""
+        """Circular frequency [rad/s] at the times `t` [s] since the start of the sweep; constant outside the sweep."""
         x = np.clip(t / self.duration, 0.0, 1.0)
         return self.omega[0] + (self.omega[1] - self.omega[0]) * x
 
     def phase_at(self, t: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Phase gained since the sweep's start [rad], for times within it."""
+        """Phase [rad] gained at the times `t` [s] since the start of the sweep; valid only within the sweep."""
         return self.omega[0] * t + 0.5 * self.chirp_rate * t * t
 
     def row(self, phase: float) -> list[float]:
@@ -109,10 +109,10 @@ class SampledRecord:
 
     def __init__(self, acceleration: NDArray[np.float64], dt: float) -> None:
         if not dt > 0.0:
-            raise InvalidInput("dt of a record", dt, "it must be a positive time in s")
+            raise InvalidInput("dt of a record", dt, "it must be a positive time step in s")
         if acceleration.ndim != 1 or acceleration.size < 2 or not np.isfinite(acceleration).all():
             raise InvalidInput(
-                "record", acceleration.shape, "it must be one-dimensional with at least two finite samples"
+                "record", acceleration.shape, "it must be one-dimensional, with at least two samples, all finite"
             )
         self.acceleration = acceleration
         self.dt = dt

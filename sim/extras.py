@@ -1,4 +1,4 @@
-"""Optional dependencies: the extras of the installation, and a check that one of them is installed."""
+"""Optional dependencies: the extras of the installation, and a check that an extra is installed."""
 
 from importlib.util import find_spec
 
@@ -12,7 +12,7 @@ EXTRAS = {
     "pdf": ("typst",),
     "distributed": ("distributed",),
 }
-"""Packages of each extra of `pyproject.toml` that this software imports."""
+"""Imported packages of each extra in `pyproject.toml`."""
 
 
 class MissingExtra(InvalidInput):

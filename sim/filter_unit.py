@@ -71,7 +71,7 @@ class FilterUnit(Parameters):
         return 1.0 / (bent * sin(pi / (2 * self.order)))
 
     def stream(self, sample_rate: float) -> "FilterStream":
-        """Start filtering channels sampled at `sample_rate` [1/s]."""
+        """Filter cards for channels sampled at `sample_rate` [1/s], before their first sample."""
         return FilterStream(*butterworth(self.order, self.cutoff / sample_rate))
 
 

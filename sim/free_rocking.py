@@ -102,7 +102,7 @@ class FreeRocking:
 
     @cached_property
     def quarters(self) -> Array:
-        """Time from the ground to each turning point [s], which equals the time back, same shape as `energies`."""
+        """Time [s] from the ground to each turning point, equal to the time back; same shape as `energies`."""
         from scipy import special
 
         phi, half = self.alpha - self.amplitudes, 0.5 * self.amplitudes

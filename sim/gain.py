@@ -35,7 +35,7 @@ class Branch:
 
     @property
     def multiplier(self) -> float:
-        """Greatest |Floquet multiplier|, per period of the drive."""
+        """Modulus of the dominant Floquet multiplier, per period of the drive."""
         return self.orbit.multiplier
 
 
@@ -98,8 +98,8 @@ def gain_spectrum(
     amplitude: float,
     bare_amplitude: float | None = None,
 ) -> list[GainPrediction]:
-    """Results of `predict_gain` at each of `omegas` [rad/s], computed faster: each orbit is extrapolated from the
-    previous ones.
+    """Results of `predict_gain` at each of `omegas` [rad/s], computed faster, because each orbit is extrapolated from
+    the previous ones.
     """
     places = [float(omega) for omega in omegas]
     try:
@@ -127,7 +127,9 @@ def seismic_curve(
     bare = simulate(specimen.bare(), record)
     if bare.status is not Status.COMPLETED or not min(bare.peaks.u1, bare.peaks.drift) > 0.0:
         raise InvalidInput(
-            "record", f"peaks of the bare frame {bare.peaks}", "the bare frame must move and stay finite"
+            "record",
+            f"peaks of the bare frame {bare.peaks}",
+            "the response of the bare frame must be finite and not zero",
         )
     coupled = [specimen.coupled(float(beta)) for beta in betas]
     curve: list[SeismicGain] = []

@@ -70,7 +70,9 @@ def _canonical(name: str) -> str:
 class Finding(Parameters):
     """One measured quantity of the specimen."""
 
-    name: str = quantity(..., "", "name of the quantity: m1, m2, k1, k2, xi1, xi2, restitution_factor, or k_c:LABEL")
+    name: str = quantity(
+        ..., "", "name of the quantity: m1, m2, k1, k2, xi1, xi2, restitution_factor, or k_c:LABEL (spring)"
+    )
     value: float = quantity(..., "", "best estimate, in the quantity's SI unit", ge=0)
     standard_uncertainty: float = quantity(..., "", "standard uncertainty (k = 1), in the quantity's SI unit", ge=0)
     source: str = quantity(..., "", "source of the value")
@@ -114,12 +116,12 @@ class Correlation(Parameters):
 
     @property
     def pair(self) -> frozenset[str]:
-        """Both names, without order."""
+        """The two names, regardless of their order."""
         return frozenset((self.first, self.second))
 
 
 class Identified(Parameters):
-    """All measured properties of a specimen. Findings without a stated correlation are independent."""
+    """All measured properties of a specimen. Findings without a stated correlation are uncorrelated."""
 
     findings: tuple[Finding, ...] = quantity((), "", "identified properties, each quantity once")
     correlations: tuple[Correlation, ...] = quantity((), "", "correlations between findings")
@@ -199,7 +201,9 @@ class Identified(Parameters):
             )
         except ValidationError as error:
             cause = error.errors()[0].get("ctx", {}).get("error", error)
-            raise InvalidInput("findings", ", ".join(values), f"no such specimen exists: {cause}") from None
+            raise InvalidInput(
+                "findings", ", ".join(values), f"these values do not form a valid specimen: {cause}"
+            ) from None
         return best if specimen.label is None else best.coupled(specimen.label)
 
     def correlation(self, names: Sequence[str]) -> NDArray[np.float64]:

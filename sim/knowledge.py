@@ -48,7 +48,7 @@ _WIDTH = {
     RESTITUTION: "restitution",
     SPRING: "spring",
 }
-"""Name of the half width of each quantity. Masses have none, because they are weighed or identified by a fit."""
+"""Half width (field of `SpecimenUncertainty`) of each quantity; none for masses, which are weighed or identified."""
 
 _OF_MASSES = "stiffness"
 """Name of the half width with which the masses are grouped in lists of contributions: one fit identifies the frame's
@@ -98,7 +98,7 @@ class SpecimenKnowledge(SpecimenUncertainty):
         return {name: size for name, size in sizes.items() if size > 0.0}
 
     def correlations(self, specimen: Specimen) -> dict[tuple[str, str], float]:
-        """Correlation coefficients of pairs of uncertain quantities; pairs that are absent are independent."""
+        """Correlation coefficients of pairs of uncertain quantities; pairs that are absent are uncorrelated."""
         measured, sizes = self._measured(specimen), self.relative(specimen)
         names, (matrix, own) = list(measured), self._spread(measured)
         # the other sources of uncertainty are independent and thus reduce the correlations
@@ -131,7 +131,7 @@ class SpecimenKnowledge(SpecimenUncertainty):
         return [(moved(step), moved(-step)) for step in steps.T if step.any()]
 
     def only(self, *widths: str) -> Self:
-        """Return a copy in which all quantities other than those with these half `widths` are exact."""
+        """Return a copy in which all quantities are exact except those whose half width is named in `widths`."""
         findings = [
             finding if _governor(finding.name) in widths else finding.model_copy(update={"standard_uncertainty": 0.0})
             for finding in self.identified.findings

@@ -19,7 +19,7 @@ class Modes:
 
     `omega`, shape (n,) [rad/s]: sign(lambda) sqrt|lambda| for the eigenvalues lambda of M^-1 K. A negative element is
     minus the growth rate of a *divergent* mode, whose stiffness is negative.
-    `shapes`, shape (n, n): column i is mode i, scaled to a unit u1 (or to a unit largest entry where u1 vanishes).
+    `shapes`, shape (n, n): column i is mode i, scaled to u1 = 1 (or to a largest entry of 1 where u1 vanishes).
     """
 
     omega: NDArray[np.float64]

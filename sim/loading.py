@@ -1,8 +1,8 @@
 """Loading of the compiled model; the first use after an installation compiles it once, which takes several seconds.
 
-Compilation runs in two processes where there are two processors: a helper compiles the modules of `APART`, which use no
-other ones or only early ones, into the same cache. Modules that it does not deliver are compiled here. Steady motions
-need none of them.
+Compilation runs in two processes where there are two processors: a helper process compiles the modules in `APART`,
+which use no other modules or only the first ones, into the same cache. Modules that it does not complete are compiled
+in this process. Predictions of steady motions need no module of `APART`.
 """
 
 import os
@@ -30,7 +30,7 @@ BENCH = {**MODEL, "laser": 3, "filter": 2, "plant": 8, "table": 15}
 """Modules used by a simulated bench."""
 
 APART = ("resting", "laser", "filter", "plant", "table", "rocking")
-"""Modules compiled by the helper, in its order."""
+"""Modules compiled by the helper, in this order."""
 
 _HELPER = """
 import sys
@@ -45,7 +45,7 @@ for name in sys.argv[2:]:
 def load_model(
     report: Callable[[str, int, int], None] = lambda _phase, _done, _all: None, modules: Mapping[str, int] = MODEL
 ) -> None:
-    """Import the `modules`. `report` is called with a description, the sum of the shares completed, and that of all."""
+    """Import the `modules`. `report` is called with a description, the sum of the completed shares, and the total."""
     if all(f"sim.kernel.{name}" in sys.modules for name in modules):
         return
     report("loading the model", 0, 0)
@@ -89,7 +89,7 @@ def helped(names: Sequence[str]) -> Generator[Mapping[str, Event], None, None]:
     try:
         yield ready
     finally:
-        # a helper that is still at work is killed
+        # a helper that is still running is killed
         end(helper, 0.0)
         join(reader)
 

@@ -1,8 +1,8 @@
 """Rocking orbits over a grid of frequency and stiffness, continued row after row.
 
 Continuation over frequency gives the first row, at constant stiffness. From there, the columns of a strip are continued
-over stiffness together, and each row is predicted from the previous ones. Memory is needed for one block of rows; the
-last rows of a block are all that the next one needs.
+over stiffness together, and each row is predicted from the previous ones. Memory is needed for one block of rows only,
+since the next block continues from the last rows of the previous one.
 """
 
 from collections.abc import Generator

@@ -52,7 +52,7 @@ class BranchMap:
 
     @cached_property
     def multiplier(self) -> Floats:
-        """Greatest |Floquet multiplier|, shape (n, m)."""
+        """Modulus of the dominant Floquet multiplier, shape (n, m)."""
         return np.abs(self.multipliers).max(axis=2)
 
     @property
@@ -137,7 +137,7 @@ def gain_map_blocks(
     """Same as `gain_map`, in blocks of `rows_at_once` stiffnesses; both axes must be ascending.
 
     Each block is returned with the state from which the next one continues. With this state as `after`, a map can be
-    continued in another process, with identical digits. `done` counts the parts of each block.
+    continued in another process, with bit-identical results. `done` counts the parts of each block.
     """
     if not (betas.size and omegas.size):
         raise InvalidInput("grid", (betas.size, omegas.size), "the map needs at least one stiffness and one frequency")

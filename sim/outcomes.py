@@ -25,7 +25,7 @@ START_DURATION = 120.0
 """Duration [s] of the default start-up."""
 
 WITHIN = 0.02
-"""Largest relative difference of the peaks from those of a steady motion at which it counts as reached."""
+"""Largest relative difference between peaks and those of a steady motion at which this motion counts as reached."""
 
 WINDOW = 20
 """Number of drive periods over which the peaks are taken: longer than the beats of a modulated motion."""
@@ -35,7 +35,7 @@ LEFT = 1e-3
 
 FEWEST_ROUNDS, MOST_ROUNDS = 10, 100
 """Minimum and maximum number of rounds, of WINDOW periods each, for which an undecided motion is continued; the minimum
-applies without a stable orbit.
+applies without a stable rocking orbit.
 """
 
 StartProgram = Callable[[float, float], SineProgram]
@@ -107,8 +107,8 @@ def reached(
 ) -> Reached:
     """Outcome of a start-up from rest that ends with a sine of `omega` [rad/s] and `amplitude` [m/s2].
 
-    The program that `start` returns must end with a dwell of at least WINDOW periods at these values. If the motion is
-    then unlike either steady motion, it is continued. `steady` are the steady motions, if already known.
+    The program that `start` returns must end with a dwell of at least WINDOW periods at these values. If the motion
+    has then reached neither steady motion, it is continued. `steady` are the steady motions, if already known.
 
     Raises InvalidInput for a bare frame, values outside their ranges, or a program with a different end.
     """

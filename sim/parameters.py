@@ -13,10 +13,10 @@ from pydantic import BaseModel, ConfigDict, Field
 from pydantic.fields import FieldInfo
 
 NEAR, NEAR_ANGULAR = 20.0, 3.0
-"""Factors around a default within which a value causes no notice.
+"""Factors from a default up to which a value causes no notice: for most units, and for those in `_ANGULAR`.
 
-A wrong prefix changes a value by a factor of 1000, and a wrong angular unit by 2 pi: the mistake is noticed if the
-intended value is within a factor of 50 or 2 of the default.
+A wrong prefix changes a value by a factor of 1000, and a wrong angular unit by 2 pi. The mistake is noticed if the
+intended value is within a factor of 50 or 2, respectively, of the default.
 """
 
 COUPLING = (0.02, 5.0)
@@ -31,7 +31,7 @@ class Parameters(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     def __repr_args__(self) -> Iterator[tuple[str | None, Any]]:
-        """Names and values of the fields that differ from their defaults."""
+        """Names and values of the required fields and of those that differ from their defaults."""
         for name, declared in type(self).model_fields.items():
             value = getattr(self, name)
             if declared.is_required() or value != declared.get_default(call_default_factory=True):

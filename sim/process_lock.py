@@ -1,6 +1,6 @@
 """Locks between processes, held by the operating system, with the name of the holder.
 
-The system releases a lock when its process ends for any reason; the existence of a file cannot serve as a lock, because
+The lock is released when its process ends for any reason; the existence of a file cannot serve as a lock, because
 the file would outlive a crashed program. The holder's name is in a second file, because a locked file cannot be read on
 Windows.
 """
@@ -13,13 +13,13 @@ from typing import Any
 from filelock import FileLock, Timeout
 
 ATTEMPTS, PAUSE = 10, 0.02
-"""Number of attempts to read the holder's name, and pause between them [s]: the holder writes it just after it has
-locked the file.
+"""Number of attempts to read the holder's name, and pause between them [s]: the holder writes its name just after
+locking the file.
 """
 
 
 class LockHeld(Exception):
-    """Another program holds the lock; the name of that program is in the file `name`."""
+    """Error: another program holds the lock. The name of that program is in the file `name`."""
 
     def __init__(self, name: Path) -> None:
         super().__init__(name)
@@ -59,7 +59,7 @@ class ProcessLock:
                 self._name.write_text(holder, encoding="utf-8")
 
     def release(self, *, remove: bool = False) -> None:
-        """Release the lock; may be called repeatedly. With `remove`, its file is removed."""
+        """Release the lock; may be called repeatedly. With `remove`, the lock file is removed."""
         if not self._lock.is_locked:
             return
         with suppress(OSError):

@@ -22,8 +22,8 @@ from sim.specimen import Specimen
 Floats = NDArray[np.float64]
 
 ORDER, TOLERANCE = 18, 1e-11
-"""Order and tolerance of the Taylor steps. They make the map smooth to rounding, as its numerical differentiation
-requires.
+"""Order and tolerance of the Taylor steps. With them, the map is smooth to within rounding errors, as required for
+its numerical differentiation.
 """
 
 Accuracy = Literal[2, 4]

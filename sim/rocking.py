@@ -22,11 +22,11 @@ REST_ANGLE = 1e-12
 """Angle of a bounce [rad] below which the block comes to rest; also the bound of the resulting error of the angle."""
 
 MOST_IMPACTS = 1_000_000
-"""Number of impacts after which a run fails; decaying bounces have about five hundred."""
+"""Number of impacts after which a run fails; a sequence of decaying bounces has about five hundred."""
 
 
 SMALLEST_PART, LARGEST_PART = 8, 64
-"""Number of runs integrated in parallel by one thread: enough to fill the lanes, few enough to balance the load."""
+"""Smallest and largest number of runs per task: enough to fill the lanes, and few enough to balance the load."""
 
 
 class Mode(IntEnum):
@@ -48,7 +48,7 @@ class Status(StrEnum):
 
 @dataclass(frozen=True)
 class State:
-    """Displacements [m] and velocities [m/s] relative to the ground, angle [rad] and angular velocity [rad/s].
+    """Displacements [m] and velocities [m/s] relative to the base, angle [rad] and angular velocity [rad/s].
 
     theta > 0 is a rotation about the left corner A, with the top moving towards the frame.
     """
@@ -165,7 +165,7 @@ def check_state(specimen: Specimen, state: State, overturning_angle: float) -> N
     if specimen.beta is None and state.mode is not Mode.REST:
         raise InvalidInput("state", state, "the bare frame has no block: theta and omega must be 0")
     if abs(state.theta) >= overturning_angle:
-        raise InvalidInput("theta", state.theta, f"the block must start below {overturning_angle:g} rad")
+        raise InvalidInput("theta", state.theta, f"its magnitude must be below {overturning_angle:g} rad at the start")
     if specimen.beta and abs(state.u1) >= specimen.d:
         raise InvalidInput("u1", state.u1, f"the spring's length must be positive: |u1| below d = {specimen.d:g} m")
 
@@ -228,7 +228,7 @@ class RockingRun:
         check_state(self.specimen, self.state, self.overturning_angle)
         duration = self.drive.duration
         if self.peaks_from is not None and not 0.0 <= self.peaks_from < duration:
-            raise InvalidInput("peaks_from", self.peaks_from, f"it must lie within the {duration:g} s of the run")
+            raise InvalidInput("peaks_from", self.peaks_from, f"it must be within the {duration:g} s of the run")
 
     @property
     def order(self) -> int:
@@ -266,5 +266,5 @@ def checked_times(sample_times: ArrayLike | None, duration: float) -> NDArray[np
     if times.ndim != 1 or not np.isfinite(times).all() or (np.diff(times) < 0.0).any():
         raise InvalidInput("sample_times", times.shape, "they must be one-dimensional, finite and ascending [s]")
     if times.size and not (times[0] >= 0.0 and times[-1] <= duration * (1.0 + 1e-12)):
-        raise InvalidInput("sample_times", (times[0], times[-1]), f"they must lie within the {duration:g} s of the run")
+        raise InvalidInput("sample_times", (times[0], times[-1]), f"they must be within the {duration:g} s of the run")
     return np.clip(times, 0.0, duration)

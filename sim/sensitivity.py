@@ -24,13 +24,13 @@ from sim.specimen import Block, Frame, Specimen
 from sim.steady import NoOrbit, Orbit, resting_state, rocking_orbit
 
 STEP = 3e-5
-"""Step of the finite differences, of fourth order, relative to the parameter; absolute for a parameter that is zero."""
+"""Step of the fourth-order finite differences, relative to the parameter; absolute for a parameter that is zero."""
 
 TOLERANCE = 1e-13
 """Integration tolerance of the runs from which finite differences are computed."""
 
 SAMPLES, ZOOMS = 401, 2
-"""Samples of each search for a peak, and number of successive refinements."""
+"""Number of samples in each search for a peak, and number of successive refinements."""
 
 Floats = NDArray[np.float64]
 
@@ -68,7 +68,7 @@ def sensitivities(
 
     `orbit` is the orbit at these parameters, if already known. The bare test also depends on the parameters, because it
     has the same frame, frequency [rad/s] and amplitude [m/s2]. beta is k_C / k1, so that a change of k1 alone also
-    changes k_C. If the peaks on both sides are equal, the derivative is that of one of them.
+    changes k_C. If the excursions to both sides are equal, the derivative is that of one of them.
 
     Raises InvalidInput as `rocking_orbit` does, and NoOrbit if the branch does not exist.
     """
@@ -191,8 +191,8 @@ def budget(
 ) -> Budget:
     """Uncertainty of alpha_1 and alpha_2 from the standard uncertainties [SI] of parameters, by name.
 
-    `correlation` contains the coefficients of pairs of names; other pairs are independent. To first order, JCGM
-    100:2008 (GUM), Eq. (10) and (13). Raises InvalidInput for unknown names, negative uncertainties or impossible
+    `correlation` contains the coefficients of pairs of names; other pairs are uncorrelated. Computed to first order
+    (JCGM 100:2008, the GUM, Eq. 10 and 13). Raises InvalidInput for unknown names, negative uncertainties or impossible
     correlations.
     """
     names = list(standard_uncertainties)

@@ -1,7 +1,8 @@
 """Models of the instruments from motion to counts: lasers, accelerometer, displacement sensor, converter.
 
-Each instrument is a group of parameters; its method `stream` starts the instrument. The samples do not depend on how
-the ticks passed to a stream are divided into blocks. Every stream has its own random generator.
+Each instrument is a group of parameters. The method `stream` starts a laser, which has internal state; the other models
+are functions of the samples. The results do not depend on how the ticks are divided into blocks, if every instrument
+has a separate random generator.
 """
 
 from math import floor
@@ -25,7 +26,7 @@ class Laser(Parameters):
     """
 
     measuring_range: float = quantity(0.200, "m", "measuring range; the storey rests at mid range", gt=0)
-    rate: float = quantity(4000.0, "1/s", "measurements per second of the laser's own clock", gt=0)
+    rate: float = quantity(4000.0, "1/s", "measurements per second, timed by the laser's free-running clock", gt=0)
     clock_error: float = quantity(20e-6, "1", "relative error of the laser's clock", gt=-0.01, lt=0.01)
     latency: int = quantity(2, "1", "number of measurements between exposure and output", ge=0, le=100)
     output_bits: int = quantity(
@@ -33,7 +34,7 @@ class Laser(Parameters):
     )
     noise: float = quantity(5e-6, "m", "standard deviation of a measurement", ge=0)
     linearity: float = quantity(
-        0.0008, "1", "amplitude of the smooth linearity error over the measuring range", ge=0, lt=0.1
+        0.0008, "1", "amplitude of the smooth linearity error, relative to the measuring range", ge=0, lt=0.1
     )
     linearity_periods: float = quantity(
         1.5, "1", "number of periods of the linearity error in the measuring range", ge=0, formerly="linearity_waves"
@@ -57,7 +58,7 @@ class Laser(Parameters):
         return 0.0038 * self.load, 0.0202 * self.load
 
     def stream(self, sample_rate: float, seed: SeedSequence) -> "LaserStream":
-        """Start measuring with ticks at `sample_rate` [1/s]."""
+        """Running laser whose output is sampled at `sample_rate` [1/s]."""
         return LaserStream(self, sample_rate, seed)
 
 
@@ -161,7 +162,7 @@ class PlacedSensor(LinearSensor):
     """Additional sensor with a proportional voltage output, for the motion of `place` relative to the ground."""
 
     name: str = quantity(..., "", "name of the sensor's channel")
-    measures: str = quantity(..., "", "measured quantity, one of SIMULATED")
+    measures: str = quantity(..., "", "measured quantity: acceleration, velocity or displacement")
     unit: str = quantity(..., "", "SI unit of the values")
     place: Place = quantity(..., "", "part on which the sensor is mounted")
     sensitivity: float = quantity(..., "V/unit", "volts per unit as calibrated")

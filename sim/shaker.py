@@ -37,7 +37,7 @@ class Shaker(Parameters):
     current_limit: float = quantity(18.0, "A", "largest coil current of the amplifier", gt=0)
     drive_range: float = quantity(10.0, "V", "largest magnitude of the drive at the amplifier's input", gt=0)
     friction: float = quantity(1.5, "N", "Coulomb friction F_c of the guides", ge=0)
-    friction_velocity: float = quantity(0.004, "m/s", "velocity v_c within which the friction reverses", gt=0)
+    friction_velocity: float = quantity(0.004, "m/s", "velocity scale v_c of the friction F_c tanh(v / v_c)", gt=0)
     half_stroke: float = quantity(0.075, "m", "distance from mid stroke to each end stop", gt=0)
     stop_stiffness: float = quantity(4.0e5, "N/m", "stiffness of an end stop", gt=0)
     stop_damping: float = quantity(
@@ -74,5 +74,5 @@ class Shaker(Parameters):
         return np.asarray(self.force_per_volt * s * s / (impedance * (1.0 + self.amplifier_lag * s)), np.complex128)
 
     def drive_for(self, acceleration: float, omega: float, payload: float = 0.0) -> float:
-        """Drive amplitude [V] for a sine of amplitude `acceleration` [m/s2] at `omega` [rad/s], linear response."""
+        """Drive amplitude [V] for a sine of amplitude `acceleration` [m/s2] at `omega` [rad/s]; linear response."""
         return acceleration / float(np.abs(self.frequency_response(omega, payload)))

@@ -14,7 +14,7 @@ from sim.errors import InvalidInput
 from sim.parameters import COUPLING, Parameters, quantity
 
 SLOWEST, FASTEST = 1e-3, 1e5
-"""Plausible natural frequencies [rad/s] of a frame on a shake table; values outside this range are typing errors."""
+"""Plausible natural frequencies [rad/s] of a frame on a shake table; others must be due to typing errors."""
 
 
 DAMPING = (0.001, 0.15)
@@ -44,7 +44,7 @@ class Frame(Parameters):
         except ArithmeticError:
             lower, upper = 0.0, 0.0
         if not (lower >= SLOWEST and upper <= FASTEST):
-            makes = f"with these masses and k2, a natural frequency is outside {SLOWEST:g} to {FASTEST:g} rad/s"
+            makes = f"with these masses and k2, a natural frequency is not between {SLOWEST:g} and {FASTEST:g} rad/s"
             raise InvalidInput("k1", self.k1, makes)
         return self
 
@@ -87,7 +87,7 @@ class Block(Parameters):
 
     @model_validator(mode="after")
     def _check_restitution(self) -> "Block":
-        # if r is below 0, as for a slab 1.42 times as wide as high, the impact would return it to the previous corner
+        # if r < 0, as for a slab 1.42 times as wide as high, the impact would return the block to the previous corner
         if not 0.0 <= self.restitution <= 1.0:
             allowed = (
                 f"with b = {self.b:g} m and h_b = {self.h_b:g} m it gives r = {self.restitution:.4g}, outside 0 to 1: "

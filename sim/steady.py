@@ -77,7 +77,7 @@ class Orbit:
 
     @cached_property
     def multiplier(self) -> float:
-        """Greatest |Floquet multiplier|: the fraction of a disturbance that remains after one period."""
+        """Modulus of the dominant Floquet multiplier: factor by which a disturbance changes in one period."""
         return float(np.abs(self.multipliers).max())
 
     @property
@@ -200,7 +200,7 @@ def resting_level(specimen: Specimen, omega: float) -> float:
 def check_steady(specimen: Specimen, omega: float, amplitude: float) -> None:
     """Raise InvalidInput for a bare frame, or unless frequency [rad/s] and amplitude [m/s2] are positive and finite."""
     if specimen.beta is None:
-        raise InvalidInput("specimen", "bare frame", "a steady motion with the block needs beta, 0 or more")
+        raise InvalidInput("specimen", "bare frame", "a steady motion with the block requires beta to be 0 or more")
     if not (isfinite(omega) and omega > 0.0):
         raise InvalidInput("omega", omega, "it must be a positive circular frequency in rad/s")
     if not (isfinite(amplitude) and amplitude > 0.0):

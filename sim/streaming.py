@@ -1,6 +1,6 @@
 """Motion under a base acceleration that arrives in blocks, as from a live bench.
 
-The result is bit-identical for any division into blocks, because all state that affects a step is kept between them.
+The result is bit-identical for any division into blocks, because all state that affects a step is kept between blocks.
 """
 
 from math import isfinite, pi
@@ -56,7 +56,7 @@ class Stream:
         check_options(tolerance, overturning_angle)
         check_state(specimen, start, overturning_angle)
         if not (dt > 0.0 and isfinite(dt)):
-            raise InvalidInput("dt", dt, "it must be a positive time in s")
+            raise InvalidInput("dt", dt, "it must be a positive, finite time step in s")
         if divisions < 0:
             raise InvalidInput("divisions", divisions, "it must be 0 or more samples per interval")
         if peaks_from is not None and not peaks_from >= 0.0:
@@ -87,7 +87,7 @@ class Stream:
 
     @property
     def status(self) -> Status:
-        """COMPLETED while the run continues."""
+        """Status of the run: COMPLETED while it continues."""
         return self.motion().status
 
     def motion(self) -> Motion:
@@ -95,7 +95,7 @@ class Stream:
         return motion_of(self._report, self._x, None, watched=self._watched)
 
     def feed(self, acceleration: ArrayLike) -> NDArray[np.float64]:
-        """Advance through the next values [m/s2], shape (n,), any n. Returns the states evaluated, shape (m, 6).
+        """Advance through the next values [m/s2], shape (n,), any n. Returns the evaluated states, shape (m, 6).
 
         m is `divisions` times the number of completed intervals; the columns are those of `State.as_array`. There are
         no rows after an overturning or a failure, which `status` reports; later input is ignored.

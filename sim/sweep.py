@@ -20,7 +20,7 @@ PATIENCE = 10.0
 """Time-out for the response of a scheduler [s]."""
 
 Done = Callable[[int, int], None]
-"""Function called with the number of completed items and the total."""
+"""Function called with the number of completed items, or of tasks sent to a scheduler, and their total."""
 
 
 class SchedulerUnavailable(RockbenchError):
@@ -54,8 +54,8 @@ def sweep(
 
     By default, the function runs in as many threads as there are processors, see `in_threads`. With the address of a
     dask `scheduler`, such as "tcp://10.0.0.5:8786", it runs in the workers of the scheduler, which need this package;
-    function and items must be picklable. There, a task has `batch` items, and `done` counts tasks: choose a value with
-    which a task takes much longer than the few milliseconds of its transfer.
+    function and items must be picklable. There, a task has `batch` items, and `done` counts tasks. Choose `batch` so
+    that a task takes much longer than the few milliseconds of its transfer.
 
     Raises InvalidInput for batch < 1, MissingExtra without the extra "distributed", and SchedulerUnavailable if the
     scheduler does not respond.

@@ -1,9 +1,9 @@
 """Steady rocking on a table moved by the reaction of the specimen: its orbit and Floquet multipliers.
 
 The motion of the table is part of the state: a disturbance of the block moves the table, which changes the stability of
-the orbit, so that the same orbit may be stable on a light table and unstable on fixed ground. The drive is periodic and
-constant from cycle to cycle, as it is within a few cycles of a slow amplitude control. Its harmonics are such that the
-acceleration of the table is a sine.
+the orbit, so that the same orbit may be stable on a light table and unstable on fixed ground. The drive is periodic,
+and the same in every cycle, since a slow amplitude control hardly changes it within a few cycles. Its harmonics are
+such that the acceleration of the table is a sine.
 """
 
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ from sim.steady import NoOrbit, Orbit, slowest_of
 Array = NDArray[np.float64]
 
 TICKS, SUBSTEPS = 600, 2
-"""Intervals of constant drive per period, and Runge-Kutta steps in each. The error of the multipliers is 4e-5."""
+"""Number of intervals of constant drive per period, and Runge-Kutta steps in each; multipliers are accurate to 4e-5."""
 
 STEP = 1e-5
 """Step of the finite differences, relative to the scale of each state."""
@@ -34,7 +34,7 @@ the derivatives are reused.
 """
 
 PURE = 1e-4
-"""Largest deviation of a harmonic of the table's acceleration from the requested sine, relative to its amplitude."""
+"""Largest deviation of a harmonic of the table's acceleration from the requested sine, relative to the fundamental."""
 
 NEWTON, CORRECTIONS = 20, 12
 """Maximum number of Newton steps, and of corrections of the drive."""
@@ -106,7 +106,7 @@ def harmonics_of(accelerations: Array, harmonics: int) -> NDArray[np.complex128]
     """Harmonics 1 to `harmonics` of an acceleration, from its means over the ticks of a period."""
     orders = np.arange(1.0, harmonics + 1.0)
     found = 2.0 * np.fft.rfft(accelerations)[1 : harmonics + 1] / accelerations.size
-    # a mean over a tick has the phase of its middle
+    # a mean over a tick has the phase of the middle of the tick
     return found * np.exp(-1j * np.pi * orders / accelerations.size)
 
 
@@ -169,7 +169,7 @@ class TablePeriod:
         """Return the state after one period, and the samples, see `advance`.
 
         `change`, shape (ticks,), is added to the commands of the period. Raises NoOrbit if the block does not rock, at
-        the end of the period, on the corner on which it started.
+        the end of the period, about the corner about which it started.
         """
         commands, y, mode = self.commands(drive), start.copy(), corner(start)
         if change is not None:

@@ -51,7 +51,7 @@ class VirtualBenchParameters(Parameters):
     def _check_cutoff(self) -> "VirtualBenchParameters":
         rate = self.sample_rate
         if self.filter_unit.cutoff >= 0.5 * rate:
-            allowed = f"it must be below sample_rate / 2 = {rate / 2:g} Hz, sample_rate = {rate:g} 1/s"
+            allowed = f"it must be below half the sample rate, {rate / 2:g} Hz (sample_rate = {rate:g} 1/s)"
             raise InvalidInput("filter_unit.cutoff", self.filter_unit.cutoff, allowed)
         return self
 
@@ -59,7 +59,7 @@ class VirtualBenchParameters(Parameters):
     def _check_references(self) -> "VirtualBenchParameters":
         if self.laser_1.reference != self.laser_2.reference:
             allowed = (
-                f"the drift needs both lasers on one reference, but laser_1.reference = {self.laser_1.reference!r}"
+                f"the drift requires one reference for both lasers, but laser_1.reference = {self.laser_1.reference!r}"
             )
             raise InvalidInput("laser_2.reference", self.laser_2.reference, allowed)
         return self
@@ -67,8 +67,9 @@ class VirtualBenchParameters(Parameters):
 
 @dataclass(frozen=True)
 class Truth:
-    """True motion at the ticks of the last block, which no instrument measures exactly: arrays of shape (n,), in SI
-    units.
+    """True motion at the ticks of the last block, without errors of instruments: arrays of shape (n,), in SI units.
+
+    `x`, `v` and `a` are those of the table; `a` is the mean acceleration since the previous tick.
     """
 
     x: Array
@@ -169,7 +170,7 @@ class VirtualBench:
 
     @property
     def sights(self) -> Array:
-        """True motion of the lasers' targets in the last `run` or `coast`, shape (4, n): `sim.arrangement.sights`."""
+        """True motion of the lasers' targets in the last `run` or `coast`, shape (4, n); see `sim.arrangement`."""
         return self._laser_displacements(np.ascontiguousarray(self._samples.T))
 
     def _laser_displacements(self, states: Array) -> Array:
@@ -196,7 +197,9 @@ class VirtualBench:
         """
         catch = self.parameters.catch_angle
         if abs(arrangement.tilt) >= catch:
-            raise InvalidInput("tilt", arrangement.tilt, f"it must be below the catch angle of {catch:g} rad")
+            raise InvalidInput(
+                "tilt", arrangement.tilt, f"its magnitude must be below the catch angle of {catch:g} rad"
+            )
         self._arrange(arrangement)
         self._held_for = None
         self._state[1:] = 0.0
@@ -260,7 +263,7 @@ class VirtualBench:
         )
 
     def _sense(self) -> Array:
-        """Voltages at the filter cards, shape (n_channels, n)."""
+        """Voltages at the inputs of the filter cards, shape (n_channels, n)."""
         p, s = self.parameters, np.ascontiguousarray(self._samples.T)
         volts = np.empty((4 + len(self._further), s.shape[1]))
         volts[0] = p.displacement_sensor.volts(s[0], p.tick_rate, self._displacement_random)

@@ -41,7 +41,7 @@ def result(future: Future[Result]) -> Result:
             return future.result(STEP)
         except NotYet:
             if future.done():
-                # return the result, or raise the exception of the work itself
+                # the future has ended, and the exception may be its own: return its result, or raise that exception
                 return future.result(0.0)
 
 

@@ -1,1 +1,1 @@
-"""Free vibration of the bare frame: stiffness and damping with their covariance, for weighed masses."""
+"""Free vibration of the bare frame: stiffness and damping with their covariance, given the storey masses."""

@@ -3,7 +3,7 @@ runs.
 
 1. The block is removed.
 2. For releases by hand, the table is locked, and storey 2 is displaced and released for each decay. For pulses, the
-   table is probed with increasing drive, from one too small to cause damage up to the required drift.
+   drive is increased from probe to probe, from a level too low to cause damage to the level for the requested drift.
 3. Each decay is recorded, fitted and published; an unusable decay is repeated once.
 4. The result combines all decays.
 """
@@ -56,16 +56,18 @@ from sim.parameters import Parameters
 from sim.specimen import Specimen
 
 RELEASE = 6.0
-"""Time within which the frame must be released by hand [s]."""
+"""Time from the start of the recording within which the frame must be released by hand [s]."""
 
 
-LOCK = "Clamp the table to the ground, so that it cannot move. It is not driven."
+LOCK = "Clamp the table to the ground so that it cannot move. The table is not driven while it is clamped."
 
 STILL_LOCKED = "THE TABLE IS STILL LOCKED: remove the clamp before the table is driven."
 
 
 class FreeVibration(Prepared[FreeVibrationParameters]):
-    """Identification of the frame. Raises InvalidInput for a pulse or displacement that the bench cannot produce."""
+    """Identification of the frame. Raises InvalidInput for a pulse or an initial displacement outside the limits of the
+    bench, or for mass uncertainties if the specimen file contains the masses.
+    """
 
     def __init__(
         self, parameters: FreeVibrationParameters, configuration: BenchConfiguration, stored: Sources | None = None
@@ -94,7 +96,7 @@ class FreeVibration(Prepared[FreeVibrationParameters]):
 
     @cached_property
     def prediction(self) -> Table:
-        """Modes of the nominal frame."""
+        """Predicted modes of the bare frame, one row per mode."""
         frame = self.configuration.known_specimen.frame
         omega = np.sort(frequencies(self._specimen))
         return {
@@ -157,22 +159,22 @@ class FreeVibration(Prepared[FreeVibrationParameters]):
 
 
 def _check_pull(parameters: FreeVibrationParameters, configuration: BenchConfiguration) -> None:
-    """Raise InvalidInput for a displacement that exceeds the lasers' range or the drift limit, or cannot be
-    measured.
+    """Raise InvalidInput for an initial displacement that is too large for the lasers or the drift limit, or too small
+    to measure.
     """
-    # after the release, the storeys also swing to the other side
+    # a storey may swing to the opposite side, by up to twice the initial displacement from where it was released
     room = min(
         SHARE * 0.5 * configuration.limits.drift,
         *(0.5 * SHARE * min(configuration.limits.laser_range, 1.0) * half for half in configuration.laser_half_ranges),
     )
     if not LEAST <= parameters.pull <= room:
-        allowed = f"it must be {LEAST:g} to {room:.3g} m: limits.drift and the lasers' ranges allow no more"
+        allowed = f"it must be {LEAST:g} to {room:.3g} m, as limited by limits.drift and the lasers' ranges"
         raise InvalidInput("pull", parameters.pull, allowed)
 
 
 def _release_forecast(configuration: BenchConfiguration, pull: float, duration: float) -> Forecast:
-    """Demands of releases by hand. There is no drive; the storeys swing from one side to the other, by at most twice
-    the initial displacement of storey 2.
+    """Demands of releases by hand, without drive. Twice the initial displacement of storey 2 is an upper bound of the
+    displacements of both storeys and of the drift.
     """
     swing = 2.0 * pull
     moved = dict.fromkeys(bounds(configuration), 0.0)
@@ -195,13 +197,13 @@ def _released_decays(
 
     def once(activity: str) -> Generator[Step, Outcome, Decay]:
         request = (
-            f"Displace storey 2 by {1e3 * pull:g} mm without touching storey 1, hold it, and release it without a push "
-            "after the recording has begun."
+            f"Displace storey 2 by {1e3 * pull:g} mm without touching storey 1, and hold it. As soon as the recording "
+            "has begun, release it without a push."
         )
         yield OperatorAction(OperatorTask.PULL_FRAME, specimen, request, pull)
         signals = yield from record(silence, setting.sample_rate, pace, activity)
         return released_decay(signals, setting)
 
-    how = f"released by hand, {window:.0f} s"
+    how = f"release by hand, decay of {window:.0f} s"
     planned = RELEASE + window + WAITING
     return (yield from repeat_decays(parameters, setting, pace, planned, once, "free vibration", how))

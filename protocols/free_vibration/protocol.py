@@ -14,7 +14,7 @@ class FreeVibrationParameters(DecayParameters):
     """Free decays of the bare frame after a pulse of the table, or after a release by hand on a locked table."""
 
     excitation: Literal["pulse", "hand"] = quantity(
-        "pulse", "", "excitation: a short motion of the table (pulse), or release of storey 2 by hand"
+        "pulse", "", "excitation: pulse (short motion of the table) or hand (release of storey 2 by hand)"
     )
     pull: float = quantity(0.020, "m", "displacement of storey 2 before the release by hand", gt=0, le=0.2)
 
@@ -31,12 +31,12 @@ class FreeVibrationParameters(DecayParameters):
 
 PROTOCOL = Protocol(
     name="free-vibration",
-    summary="Free decay of the bare frame: stiffness and damping with their covariance, for weighed masses.",
+    summary="Free decay of the bare frame: stiffness and damping with their covariance, given the storey masses.",
     details=(
         "A short pulse of the table, or a release by hand on a locked table, excites the bare frame. For each of "
         "several decays, the exact response to the measured motion of the table is fitted to the signals of both "
-        "lasers. Other runs load the result, specimen.json, instead of the assumed values. Without options, a run has "
-        "five decays after pulses and takes about ten minutes."
+        "lasers. Other runs can use the result, specimen.json, in place of the assumed values. Without options, a run "
+        "has five decays after pulses and takes about ten minutes."
     ),
     example="--config bench.toml --operator Weber",
     parameters=FreeVibrationParameters,

@@ -25,7 +25,7 @@ _SIGNS = {"k1": ("k₁", "k1_n_m"), "k2": ("k₂", "k2_n_m"), "xi1": ("ξ₁", "
 
 @dataclass(frozen=True)
 class Course:
-    """Damping ratio of a mode in one decay against the amplitude of its drift [m], with expanded uncertainties."""
+    """Damping ratio of a mode in one decay against the drift amplitude in the mode [m]; expanded uncertainty."""
 
     amplitude: Sequence[float]
     damping: Sequence[float]
@@ -33,7 +33,7 @@ class Course:
 
 
 def vibration_sections(campaign: Campaign) -> list[Section]:
-    """Report section on stiffness and damping of the frame, by decay; fields that older files lack are omitted."""
+    """Report section on stiffness and damping of the frame, by decay; parts that older files lack are omitted."""
     points = campaign.points
     if not points:
         return []
@@ -50,7 +50,7 @@ def _frame_text(points: list[dict[str, Any]]) -> Part:
     )
     birge = together[-1]["birge"] if together else None
     if birge is not None:
-        text += f" The scatter of the decays is at most {birge:.2f} times their uncertainty (Birge ratio)."
+        text += f" The scatter of the decays, relative to their uncertainties (Birge ratio), is at most {birge:.2f}."
     return text
 
 
@@ -113,7 +113,7 @@ def _damping(points: list[dict[str, Any]]) -> Table:
         ]
         for row in points
     ]
-    return Table("Residual of the fit, and whether the damping depends on the amplitude (99 %)", columns, rows)
+    return Table("Residual of the fit, and significance of the change of damping with amplitude (99 %)", columns, rows)
 
 
 def _damping_course(points: Rows) -> list[Part]:
@@ -125,7 +125,7 @@ def _damping_course(points: Rows) -> list[Part]:
     modes = [[_course(row[f"damping{mode}_course"]) for row in told] for mode in (1, 2)]
     figure = _damping_figure(modes, [together[-1]["xi1"], together[-1]["xi2"]])
     caption = "Damping ratios in five windows of every decay against the drift amplitude in the mode."
-    return [Picture(figure, caption, "Damping ratio against amplitude for both modes, with the stated value.")]
+    return [Picture(figure, caption, "Damping ratio against amplitude for both modes, with the combined value.")]
 
 
 def _course(told: str) -> Course:
@@ -134,7 +134,7 @@ def _course(told: str) -> Course:
 
 
 def _damping_figure(modes: Sequence[Sequence[Course]], ratios: Sequence[float]) -> "Figure":
-    """Figure with a panel for each mode: damping ratio of all decays against amplitude, and the stated value."""
+    """Figure with a panel for each mode: damping ratio of every decay against amplitude, and the combined value."""
     figure = new_figure(6.8, 2.7)
     panels = figure.subplots(1, len(modes), squeeze=False)[0]
     for number, (panel, courses, ratio) in enumerate(zip(panels, modes, ratios, strict=True), 1):
@@ -149,7 +149,7 @@ def _damping_figure(modes: Sequence[Sequence[Course]], ratios: Sequence[float]) 
                 color=BLUE,
                 label="windows of the decays (k = 2)" if place == 0 else None,
             )
-        panel.axhline(100.0 * ratio, color=VERMILLION, linewidth=0.9, label="stated")
+        panel.axhline(100.0 * ratio, color=VERMILLION, linewidth=0.9, label="all decays combined")
         panel.set_xlabel(f"drift in mode {number}  [mm]", fontsize=8)
         panel.set_ylabel(f"ξ{'₁₂'[number - 1]}  [%]", fontsize=8)
         panel.tick_params(labelsize=8)

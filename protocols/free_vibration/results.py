@@ -93,7 +93,7 @@ def _notes(point: DecayPoint, result: FrameResult) -> list[str]:
     damping = (
         "The damping does not depend significantly on the amplitude."
         if point.damping_is_linear
-        else "The damping depends on the amplitude: see the figure; the stated value is its mean over the decays."
+        else "The damping depends on the amplitude: see the figure; the value given is the mean over the decays."
     )
     # the largest contribution to each quantity of the combined result
     largest = {
@@ -102,7 +102,7 @@ def _notes(point: DecayPoint, result: FrameResult) -> list[str]:
     }
     most = ", ".join(f"{name}: {part}" for name, part in largest.items())
     birge = "" if point.birge is None else f" Birge ratio at most {point.birge:.2f}."
-    return ["", f"+- is the expanded uncertainty, k = 2. Largest contribution: {most}.{birge}", damping]
+    return ["", f"+- is the expanded uncertainty, k = 2. Largest contributions: {most}.{birge}", damping]
 
 
 def _draw_decay(decay: "Axes", rest: "Axes", result: FrameResult) -> None:

@@ -44,8 +44,9 @@ MARGIN = 1.0
 class HarmonicCampaign(Prepared[HarmonicParameters]):
     """Harmonic campaign.
 
-    Raises InvalidInput if the steady motions, which are quick to compute, exceed the table, the lasers or the limits of
-    the bench. These checks name the parameter to change; the forecast simulates the complete run, including starts.
+    Raises InvalidInput if the steady motions, which are quick to compute, exceed the stroke, the ranges of the lasers
+    or the limits of the bench. The error names the parameter to change. The forecast simulates the complete run,
+    including starts.
     """
 
     def __init__(
@@ -109,9 +110,10 @@ class HarmonicCampaign(Prepared[HarmonicParameters]):
         )
 
     def _steady_motion(self, beta: float | None, omega: float) -> Travel | None:
-        """Peaks of the storeys, as the lasers measure them, and of the drift in the steady state at `omega` [rad/s].
+        """Peak displacements of the storeys, as the lasers measure them, and peak drift [m], in the steady state at
+        `omega` [rad/s].
 
-        For `beta` None the motion of the bare frame, otherwise the rocking motion; None if no orbit was found.
+        The motion is that of the bare frame if `beta` is None, otherwise the rocking motion; None without an orbit.
         """
         if (beta, omega) not in self._motions:
             grounded = self.configuration.laser_reference == "ground"
@@ -156,7 +158,7 @@ class HarmonicCampaign(Prepared[HarmonicParameters]):
                 peaks = () if motion is None else (motion.storey_1, motion.storey_2)
                 for number, (peak, half) in enumerate(zip(peaks, halves, strict=False), 1):
                     if peak > half:
-                        what = "the bare frame" if beta is None else f"beta = {beta:g}"
+                        what = "the bare frame" if beta is None else f"the frame with beta = {beta:g}"
                         moves = f"storey {number} of {what} moves by {1e3 * peak:.0f} mm at this frequency"
                         needs = f"{moves}, but its laser measures only up to {1e3 * half:.0f} mm"
                         raise InvalidInput("omega", omega, needs)
@@ -199,7 +201,7 @@ def gain_spectra(parameters: HarmonicParameters, specimen: Specimen, known: Spec
     return {
         "omega": Column(np.array(omega), "rad/s", "circular frequency of the base motion"),
         "beta": Column(np.array(beta), "1", "stiffness ratio of the coupling spring"),
-        "alpha_1": Column(np.array([branch.alpha_1 for branch in branches]), "1", "gain of the peak of u1"),
+        "alpha_1": Column(np.array([branch.alpha_1 for branch in branches]), "1", "gain of the peak displacement u1"),
         "alpha_2": Column(alpha_2, "1", "gain of the peak drift"),
         "alpha_2_uncertainty": Column(
             band.uncertainty, "1", "expanded uncertainty of alpha_2 (k = 2) due to the specimen"
@@ -249,7 +251,7 @@ def _cells(row: dict[str, Any]) -> list[str]:
         return ABSENT if value is None else yes if value else no
 
     measured, predicted = row.get("alpha_2"), row.get("alpha_2_predicted")
-    # an unsteady motion does not follow the predicted orbit
+    # an unsteady motion does not follow the predicted orbit, so no difference is shown
     compared = row.get("status") in ("steady", "resting", "held")
     return [
         number("beta", ".3f"),
@@ -277,16 +279,14 @@ def _remarks(rows: list[dict[str, Any]]) -> list[str]:
     orbits = [row["orbit_agrees"] for row in rows if row.get("orbit_agrees") is not None and row.get("agrees") is None]
     if orbits:
         verdict = counted(len(orbits) - sum(orbits), "disagrees", "disagree")
-        lines.append(
-            f"{len(orbits)} more compared by the gain of the orbit about which their motion revolves, {verdict}."
-        )
+        lines.append(f"Unsteady points compared by the gain of their mean cycle: {len(orbits)}, {verdict}.")
     known = [row for row in rows if row.get("dominating") and row.get("alpha_2")]
     if known:
         shares = [100.0 * row["alpha_2_uncertainty"] / row["alpha_2"] for row in known]
         most = Counter(str(row["dominating"]) for row in known).most_common()
         named = ", ".join(f"{name} ({number})" for name, number in most)
         span = " to ".join(dict.fromkeys(f"{share:.2f}" for share in (min(shares), max(shares))))
-        text = f"the expanded uncertainty of alpha_2 is {span} % (k = 2); largest contributions: {named}."
+        text = f"Expanded uncertainty of alpha_2 (k = 2): {span} %; largest contribution (number of points): {named}."
         lines += textwrap.wrap(text, WIDTH)
     remarks = [str(row.get("reason") or "").split("; ") for row in rows]
     shared = [each for each in remarks[0] if each and all(each in own for own in remarks)] if len(rows) > 1 else []

@@ -32,7 +32,7 @@ def trials(
     response: TableResponse | None,
     starts: Mapping[tuple[float, float], Sequence[Start]],
 ) -> Iterator[Trial]:
-    """Every stage that the plan may reach, with each of the planned `starts`, by stiffness ratio and frequency.
+    """Every stage that the plan may reach; `starts` are the planned starts by stiffness ratio and frequency [rad/s].
 
     Without a `response` of the table, the calibration of the bare frame is assumed to reach its level exactly.
     """
@@ -65,7 +65,7 @@ def _bare_tests(parameters: HarmonicParameters, specimen: Specimen) -> Iterator[
         stage = Stage(f"the bare frame at omega = {omega:g} rad/s", (segment,))
         longest = _longest_dwell(parameters)
         yield Trial(stage, specimen.bare(), before, hold=BARE_HOLD, longest=longest, steady=omega)
-        # the next stage starts from this motion, which is as steady after `hold` seconds as the damping allows
+        # the next stage starts from this motion after BARE_HOLD seconds, when the damping has reduced its transient
         before = (Segment(parameters.ramp_time, amplitude, omega), replace(segment, duration=BARE_HOLD))
 
 

@@ -1,4 +1,4 @@
-"""Comparison of a free motion with the model's long-term motion, where the orbit on the table is unstable."""
+"""Comparison of a free motion, one that is not held, with the model's long-term motion, where the orbit is unstable."""
 
 from math import isfinite
 from typing import Any
@@ -12,13 +12,13 @@ from sim.specimen import Specimen
 from sim.steady import NoOrbit
 
 MEMBERS = 8
-"""Number of specimens drawn for the range of the greatest peak."""
+"""Number of specimens drawn, within the uncertainty, for the range of the greatest peak."""
 
 
 def with_free_prediction(
     point: HarmonicPoint, specimen: Specimen, amplitude: float, configuration: BenchConfiguration, harmonics: int
 ) -> HarmonicPoint:
-    """The point of an unsteady free motion, with the prediction of this motion at `amplitude` [m/s2] added.
+    """Add to a point the prediction of its unsteady free motion at `amplitude` [m/s2].
 
     Other points are unchanged. Nothing is added without a model of the table, or where disturbances of the orbit decay,
     since the free motion then tends to the orbit.
@@ -82,9 +82,9 @@ def _numbers(motion: LongTerm) -> dict[str, Any]:
 
 def _remark(found: dict[str, Any], agrees: bool | None) -> str:
     if found["greatest"] is None:
-        return "the model's free motion ends with a fall"
+        return "the model's free motion ends with a fall of the block"
     repeats = f"repeats every {found['repeats']} cycles" if found["repeats"] else "does not repeat"
     text = f"the model's free motion {repeats}, with peaks up to alpha_2 = {found['greatest']:.3f}"
     if found["low"] is not None:
-        text += f", between {found['low']:.3f} and {found['high']:.3f} for 95 % of the specimens"
+        text += f", between {found['low']:.3f} and {found['high']:.3f} for 95 % of the specimens within the uncertainty"
     return text if agrees is not False else f"{text}; the measured peak is outside this range"

@@ -39,8 +39,8 @@ class Conditions:
     """Conditions of a test at `omega` [rad/s], and the model and reference with which its result is compared.
 
     `reference` is the bare frame's dwell at the same frequency, `known` the uncertainty of the `specimen`. Stability on
-    the table is predicted with the model `shaker`, if there is one, whose motion is controlled up to the harmonic
-    `harmonics`.
+    the table is predicted with the model `shaker`, if there is one; `harmonics` is the number of harmonics of the
+    table's motion that are controlled.
     """
 
     omega: float
@@ -68,7 +68,7 @@ class Conditions:
         return log(more.alpha_2 / less.alpha_2) / log(around[1] / around[0])
 
     def comparison(self, name: str, branch: Branch | None, peak: SteadyPeak) -> "_Comparison":
-        """The branch `name` at the amplitude of `peak`; `branch` is None if it does not exist."""
+        """Comparison with the branch `name` at the amplitude of `peak`; `branch` is None if it does not exist."""
         return _Comparison(self, branch, self.slope(name, peak), predicted_fields(name, branch, self.known))
 
 
@@ -82,8 +82,8 @@ class _Comparison:
     predicted: dict[str, Any]
 
     def compare(self, peak: SteadyPeak) -> tuple[Gain, bool | None]:
-        """Gain of a peak, and whether it agrees with the predicted gain: the two differ by no more than their combined
-        expanded uncertainty (|E_n| <= 1, ISO 13528). None if there is no prediction or the reference was not steady.
+        """Gain of a peak, and whether it agrees with the predicted gain, i.e. differs by no more than the combined
+        expanded uncertainty (|E_n| <= 1, ISO 13528). The verdict is None without a prediction or a steady reference.
         """
         reference, branch = self.conditions.reference, self.branch
         measured = gain(peak, reference.peak, self.conditions.sensors, self.slope)
@@ -93,7 +93,7 @@ class _Comparison:
         return measured, abs(measured.alpha_2 - branch.alpha_2) <= hypot(measured.uncertainty, uncertainty)
 
     def fields(self, peak: SteadyPeak, measured: Gain, agrees: bool | None, table: Settled | Held) -> dict[str, Any]:
-        """Fields of a measured motion: its gain, the comparison with the prediction, and the errors of the table."""
+        """Fields of a measured motion: gain, comparison with the prediction, and errors of the table's motion."""
         return self.predicted | {
             "alpha_2": measured.alpha_2,
             "alpha_2_uncertainty": measured.uncertainty,
@@ -109,7 +109,7 @@ class _Comparison:
 
 
 def judge(settled: Settled, conditions: Conditions, starts: int, held: Held | None = None) -> HarmonicPoint:
-    """Point of a dwell after `starts` tried starts, compared with the branch whose peaks of drift and u1 are nearest.
+    """Point of a dwell after `starts` attempts, compared with the branch whose peaks of drift and u1 are nearest.
 
     If the motion is not steady or the orbit is unstable, stability is also predicted on the table. If the motion was
     then `held` on the rocking orbit, gain and comparison are for the held motion, and the free motion is described in
@@ -153,19 +153,19 @@ def judge(settled: Settled, conditions: Conditions, starts: int, held: Held | No
 
 
 def _held_point(free: HarmonicPoint, held: Held, conditions: Conditions) -> HarmonicPoint:
-    """The point of a free motion that was then held; if the hold was released, only the reason is added."""
+    """The point of a free motion that was then held; if it was not held on the orbit, only a remark is added."""
     peak = held.peak
     if peak is None:
-        released = f"the hold of the motion on its orbit was released after {held.cycles} cycles"
+        released = f"the hold of the motion on its orbit was released after cycle {held.cycles}"
         text = f"{released if held.cycles else 'the motion could not be held on its orbit'}: {held.reason}"
         return _remarked(free, text)
     branches = conditions.branches(peak)
     if _nearest(branches, peak) != _ROCKING or _ROCKING not in branches:
-        return _remarked(free, "the held motion is not the rocking orbit")
+        return _remarked(free, "the held motion is not on the rocking orbit")
     comparison = conditions.comparison(_ROCKING, branches[_ROCKING], peak)
     measured, agrees = comparison.compare(peak)
     remarks = [f"free: {free.reason}"] if free.reason else []
-    remarks.append(f"held after {held.captured} cycles with a control of {100.0 * held.control:.2g} % of the amplitude")
+    remarks.append(f"captured after cycle {held.captured}, control {100.0 * held.control:.2g} % of the amplitude (rms)")
     remarks += [*_amplitude_remark(held), *([DIFFERS] if agrees is False else [])]
     return free.model_copy(
         update={
@@ -227,7 +227,7 @@ def predicted_fields(name: str, branch: Branch | None, known: SpecimenKnowledge)
 
 
 def _nearest(branches: dict[str, Branch], peak: SteadyPeak) -> str:
-    """The branch whose peaks of drift and u1 are closest to the measured peaks, by their ratios."""
+    """The branch whose peaks of drift and u1 are closest to the measured peaks on a logarithmic scale."""
 
     def distance(name: str) -> float:
         expected = branches[name].orbit.peaks
@@ -270,13 +270,13 @@ def _remarks(
 ) -> Iterator[str]:
     state, peak = settled.steadiness, settled.peak
     if not state.steady:
-        yield f"not steady after {settled.time:.0f} s: {_described(settled)}, spread {100.0 * state.spread:.1f} %"
+        yield f"not steady after {settled.time:.0f} s: {_described(settled)}, cycle spread {100.0 * state.spread:.1f} %"
         if on_table is not None:
             yield f"disturbances of the predicted orbit {_growth(branches[_ROCKING].multiplier, on_table)}"
         if orbit:
             gained = f"alpha_2 = {orbit['alpha_2_orbit']:.4f} +- {orbit['alpha_2_orbit_uncertainty']:.4f}"
             verdict = {True: ", which agrees with the prediction", False: ", which differs from the prediction"}
-            yield f"its mean cycle gives the gain of the orbit: {gained}{verdict.get(orbit['orbit_agrees'], '')}"
+            yield f"the mean cycle gives the gain of the orbit: {gained}{verdict.get(orbit['orbit_agrees'], '')}"
     elif name in branches and not branches[name].stable:
         growth = _growth(branches[name].multiplier, on_table)
         yield f"steady while measured; disturbances of the predicted orbit {growth}"

@@ -102,15 +102,15 @@ class HarmonicPlan:
     def _point(
         self, specimen: Specimen, omega: float, calibration: DriveCalibration, starts: Sequence[Start]
     ) -> Generator[Step, Outcome, HarmonicPoint]:
-        """Try the planned starts. Returns the first steady or held rocking motion or, if there is none or the predicted
-        orbit is not stable, the first motion without a fall.
+        """Try the planned starts until a motion is steady or held; if the predicted orbit is unstable, until the block
+        does not fall. Otherwise returns the first point without a fall or, after falls only, an overturned point.
         """
         found: HarmonicPoint | None = None
         falls = 0
         orbit = self._orbit(specimen, omega)
         slow = orbit is not None and orbit.multiplier > SLOW
         late = too_late(self._configuration, omega)
-        # if the motion cannot be held, the first start already states the reason
+        # also prepared if a correction would come too late: the first start then gives the reason
         held_by = self._prepared(orbit) if slow or late is not None else None
         for tried, start in enumerate(starts, 1):
             where = f"beta = {specimen.label:g} at {omega:g} rad/s, start {tried} of {len(starts)}: {start.name}"
@@ -144,7 +144,7 @@ class HarmonicPlan:
                 return point
             found = found or point
             if held_by is None and not settled.steadiness.steady:
-                # the motion after the next start is held if it does not become steady either
+                # if the motion after the next start does not become steady either, it is held
                 held_by = self._prepared(orbit)
         if found is not None:
             return found.model_copy(update={"starts_tried": len(starts)})
@@ -163,7 +163,7 @@ class HarmonicPlan:
             bare_amplitude_m_s2=bare.amplitude,
             starts_tried=falls,
             start_chance=chance,
-            reason=f"the block fell in all {falls} starts; the predicted orbit is {kind}",
+            reason=f"the block fell after every start ({falls} tried); the predicted orbit is {kind}",
         )
 
     def _target_branch(self, specimen: Specimen, omega: float) -> Branch | None:
@@ -193,7 +193,7 @@ class HarmonicPlan:
     ) -> Generator[Step, Outcome, Held | Fallen]:
         """Hold the present motion on its orbit, and measure it."""
         if settled.table is None:
-            return Held(None, "the sine of the table has not been measured")
+            return Held(None, "the amplitude and phase of the table are unknown")
         sine = Sine(omega, self._amplitude, calibration)
         free = settled.peak.drift if settled.motion is None else settled.motion.greatest
         limits = self._configuration.limits
@@ -215,7 +215,7 @@ class HarmonicPlan:
     def _settle(
         self, omega: float, specimen: Specimen | None, calibration: DriveCalibration
     ) -> Generator[Step, Outcome, Settled | Fallen]:
-        """Settle and measure; publishes the running alpha_2 and its prediction."""
+        """Wait for a steady state and measure; publishes the running alpha_2 and its prediction."""
         sine = Sine(omega, self._amplitude, calibration)
         report = self._report(omega, specimen)
         frame = linear_frame(self._configuration) if specimen is None else None

@@ -1,4 +1,4 @@
-"""Harmonic protocol: measured against predicted gain in steady sine tests."""
+"""Harmonic protocol: comparison of measured and predicted gain in steady sine tests."""
 
 from enum import StrEnum
 from typing import Annotated, Literal
@@ -14,7 +14,7 @@ Stiffness = Annotated[float, Field(gt=0, le=100)]
 
 
 class HarmonicPoints(Parameters):
-    """Points of a campaign."""
+    """Test points of a campaign: frequencies, stiffness ratios and amplitude."""
 
     omega: tuple[Frequency, ...] = quantity(
         (12.5, 15.0, 17.5, 20.0), "rad/s", "circular frequencies of the base motion", min_length=1
@@ -34,7 +34,10 @@ class HarmonicParameters(SineParameters, HarmonicPoints):
     """Steady-state harmonic tests of the bare and the coupled frame; the paper's campaign is the default."""
 
     hold: bool = quantity(
-        True, "", "whether a motion that is unstable or does not become steady is held on its orbit and measured again"
+        True,
+        "",
+        "whether a motion that does not become steady, or whose orbit is unstable, is held on its orbit and measured "
+        "again",
     )
 
 
@@ -49,10 +52,10 @@ class PointStatus(StrEnum):
 
 
 class HarmonicPoint(Parameters):
-    """Measured and predicted gain at one frequency and stiffness.
+    """Measured and predicted gain at one frequency and stiffness ratio.
 
-    Values that were not measured or do not exist are None, never zero. Uncertainties are expanded (k = 2). The
-    prediction is for the branch of the point and the achieved amplitudes.
+    Quantities that were not measured or do not exist are None, never zero. Uncertainties are expanded (k = 2) unless
+    called standard. The prediction is for the branch of the point and the achieved amplitudes.
     """
 
     omega_rad_s: float = quantity(..., "rad/s", "circular frequency of the base motion")
@@ -85,18 +88,22 @@ class HarmonicPoint(Parameters):
         "1",
         "lower end of the range of alpha_2_greatest_predicted for 95 % of the specimens within the uncertainty",
     )
-    alpha_2_greatest_high: float | None = quantity(None, "1", "upper end of the range of alpha_2_greatest_predicted")
+    alpha_2_greatest_high: float | None = quantity(
+        None,
+        "1",
+        "upper end of the range of alpha_2_greatest_predicted for 95 % of the specimens within the uncertainty",
+    )
     repeats_predicted: int | None = quantity(
         None, "1", "predicted number of cycles after which the free motion repeats; absent if it does not repeat"
     )
     falls_predicted: float | None = quantity(
-        None, "1", "share of specimens, drawn within the uncertainty, whose block falls in a free motion"
+        None, "1", "fraction of the specimens drawn within the uncertainty whose block falls in the free motion"
     )
     free_agrees: bool | None = quantity(
-        None, "1", "whether alpha_2_greatest lies in the predicted range, extended by its uncertainty"
+        None, "1", "whether alpha_2_greatest is within the predicted range, widened by the measurement uncertainty"
     )
     alpha_2_orbit: float | None = quantity(
-        None, "1", "gain of the mean cycle of a motion that revolves about a periodic one: the gain of the orbit"
+        None, "1", "gain of the orbit about which an unsteady motion revolves, from the mean cycle of the motion"
     )
     alpha_2_orbit_uncertainty: float | None = quantity(None, "1", "expanded uncertainty of alpha_2_orbit (k = 2)")
     orbit_agrees: bool | None = quantity(
@@ -108,19 +115,20 @@ class HarmonicPoint(Parameters):
     multiplier: float | None = quantity(
         None,
         "1",
-        "measured modulus of the slowest multiplier of an unsteady motion, or of a held motion after its release; "
-        "below 1, the motion becomes periodic",
+        "measured modulus of the dominant Floquet multiplier of an unsteady motion, or of a held motion after its "
+        "release; below 1, the motion becomes periodic",
     )
     multiplier_uncertainty: float | None = quantity(None, "1", "expanded uncertainty of the multiplier (k = 2)")
     multiplier_angle_rad: float | None = quantity(
-        None, "rad", "measured argument of the multiplier: angle of the spiral in a cycle"
+        None, "rad", "measured argument of the multiplier: rotation of the deviation in a cycle"
     )
     dominating: str = quantity("", "", "largest contribution to the uncertainty of alpha_2")
     uncertainty_parts: str = quantity("", "", "standard uncertainty of alpha_2 by contribution, largest first, as JSON")
     uncertainty_correlations: str = quantity(
         "",
         "",
-        "correlation between the errors of both tests by contribution, as JSON; correlated errors cancel in alpha_2",
+        "correlation between the errors of the coupled and the bare test, by contribution, as JSON; correlated errors "
+        "cancel in alpha_2",
     )
     degrees_of_freedom: float | None = quantity(
         None, "1", "effective degrees of freedom of the uncertainty of alpha_2 (GUM G.4); absent above 1000"
@@ -133,7 +141,7 @@ class HarmonicPoint(Parameters):
     table_multiplier: float | None = quantity(
         None,
         "1",
-        "predicted modulus of the slowest multiplier on the simulated table, if the motion is not steady or "
+        "predicted modulus of the dominant Floquet multiplier on the simulated table, if the motion is not steady or "
         "the orbit is unstable on fixed ground",
     )
     agrees: bool | None = quantity(
@@ -147,7 +155,7 @@ class HarmonicPoint(Parameters):
     bare_amplitude_m_s2: float | None = quantity(None, "m/s2", "achieved amplitude of the table, bare frame")
     amplitude_error: float | None = quantity(None, "1", "relative error of the table's amplitude, coupled frame")
     phase_error_rad: float | None = quantity(
-        None, "rad", "phase lead of the table relative to the oscillator, coupled frame"
+        None, "rad", "phase lead of the table relative to the drive oscillator, coupled frame"
     )
     table_harmonics: float | None = quantity(
         None,
@@ -161,10 +169,13 @@ class HarmonicPoint(Parameters):
     start_chance: float | None = quantity(
         None,
         "1",
-        "estimated probability of success of the measured start, or of the best start if the block fell in all starts",
+        "estimated probability of success of the measured start, or of the best start if the block fell after every "
+        "start",
     )
     cycles_measured: int = quantity(0, "1", "number of cycles evaluated for the peaks")
-    settle_time_s: float | None = quantity(None, "s", "time from the start of the dwell to the steady state")
+    settle_time_s: float | None = quantity(
+        None, "s", "time from the start of the dwell to the end of the measured cycles"
+    )
     reason: str = quantity("", "", "remarks, or the reason why the point is not steady")
 
 
@@ -174,11 +185,12 @@ class HarmonicSettings(Parameters):
     measured_cycles: int | None = quantity(
         None,
         "1",
-        "number of cycles used at the end of each dwell, after the last change of its drive; if absent, as measured",
+        "number of cycles evaluated at the end of each dwell, at most those after the last change of its drive; if "
+        "absent, as in the campaign",
         ge=4,
         le=10000,
     )
-    # equals bench.analysis.cycles.HARMONICS, which is not imported, so that options are listed quickly
+    # equals bench.analysis.cycles.HARMONICS; importing it would slow down the listing of the options
     harmonics: int = quantity(10, "1", "number of harmonics fitted to each cycle", ge=1, le=60)
     peak: Literal["judged", "mean", "largest"] = quantity(
         "judged",
@@ -188,7 +200,7 @@ class HarmonicSettings(Parameters):
     settle_tolerance: float | None = quantity(
         None,
         "1",
-        "largest remaining relative change of a channel that is considered steady; if absent, as measured",
+        "largest remaining relative change of a channel that is considered steady; if absent, as in the campaign",
         gt=0,
         le=0.1,
     )

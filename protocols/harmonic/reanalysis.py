@@ -1,4 +1,4 @@
-"""Re-analysis of a recorded harmonic campaign with other cycles, harmonics, peaks, accuracies or specimen."""
+"""Re-analysis of a recorded harmonic campaign with different cycles, harmonics, peaks, accuracies or specimen."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -36,9 +36,9 @@ from sim.gain import predict_gain
 
 @dataclass
 class _Series:
-    """Consecutive dwells at one frequency. `recent` are the cycles since the last change of the drive. A `hold` changes
-    the drive in every cycle, so its `recent` are all cycles until it is `released`. `held` is the hold of the same
-    motion.
+    """Consecutive dwells at one frequency. `recent` are the cycles since the last change of the drive; in a `hold`,
+    which changes the drive in every cycle, they are all cycles until the hold is `released`. `held` is the series of
+    the hold that follows.
     """
 
     sine: Sine
@@ -57,7 +57,7 @@ class _Series:
 
 
 class HarmonicFollower:
-    """A `bench.protocol.Follower` of the harmonic plan."""
+    """Recomputes the points of a harmonic campaign from its recorded steps; a `bench.protocol.Follower`."""
 
     def __init__(
         self,
@@ -174,8 +174,8 @@ class HarmonicFollower:
         return found.model_copy(update={"start_chance": point.start_chance})
 
     def _unlike(self, series: _Series, point: HarmonicPoint) -> float:
-        """Difference between the table amplitudes of a dwell and a point [m/s2], by which the dwell of a point is
-        found.
+        """Difference between the table amplitudes of a dwell and of a point [m/s2]; it is smallest for the dwell of the
+        point.
         """
         if point.status is PointStatus.HELD:
             # the amplitude of a held point was measured during the hold

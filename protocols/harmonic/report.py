@@ -1,4 +1,4 @@
-"""Report sections on steady sine tests: gains, uncertainty budgets, spectra (Fig. 6), map (Fig. 4), cycles (Fig. 5)."""
+"""Report sections on steady sine tests: gains, budgets, and spectra, map and cycles (Figs. 6, 4, 5 of the paper)."""
 
 from collections.abc import Mapping, Sequence
 from math import degrees
@@ -48,8 +48,8 @@ def _results_section(campaign: Campaign) -> Section:
     points = campaign.harmonic_points
     compared = [row["agrees"] for row in points if row["agrees"] is not None]
     parts: list[Part] = [
-        f"{counted(len(points), 'point was', 'points were')} tested; {len(compared)} of them had a steady "
-        f"motion that can be compared, and {counted(sum(compared), 'of those agrees', 'of those agree')} with the "
+        f"{counted(len(points), 'point was', 'points were')} tested, {len(compared)} with a steady or held "
+        f"motion that can be compared, of which {counted(sum(compared), 'agrees', 'agree')} with the "
         "prediction. Both gains are for the achieved amplitudes of the table and for the branch of the point. They "
         "agree when they differ by no more than their combined uncertainty (root sum of squares). The uncertainty of a "
         "measured gain is expanded (k = 2) and includes sensors and scatter; that of a predicted gain (k = 2, to first "
@@ -64,7 +64,7 @@ def _results_section(campaign: Campaign) -> Section:
         if row["reason"]
     ]
     if remarks:
-        parts += ["Remarks on single points:", Listing(remarks)]
+        parts += ["Remarks on individual points:", Listing(remarks)]
     return Section("results", "Harmonic tests: measured against predicted", parts)
 
 
@@ -92,7 +92,7 @@ def _holds_section(campaign: Campaign) -> Section | None:
             hold_figure(cycles, row["omega_rad_s"], row["beta"]),
             f"Hold at β = {row['beta']:g}, Ω = {row['omega_rad_s']:g} rad/s: peak drift and control of each cycle, "
             "including those after the release.",
-            "Peak drift and control, both logarithmic, against the number of the cycle.",
+            "Peak drift and control, both logarithmic, against the cycle number.",
         )
         for row in held
     ]
@@ -148,7 +148,7 @@ def _histories(campaign: Campaign, points: Sequence[Mapping[str, Any]]) -> list[
 
 
 def _branch(campaign: Campaign, row: Mapping[str, Any]) -> Branch | None:
-    """Steady motion of the model at the achieved amplitudes."""
+    """Predicted branch of a point at its achieved amplitudes; None if there is none."""
     if row["amplitude_m_s2"] is None or row["layer"] not in BRANCHES:
         return None
     specimen = campaign.specimen.coupled(row["beta"])

@@ -39,7 +39,7 @@ PERIODS, SAMPLES = 3, 120
 """Number of periods of the drive that are drawn, and number of points per curve and period."""
 
 QUIET = 1.5
-"""Time at the start of a run in which the signals are zeroed [s]; the table is at rest for 2 s."""
+"""Time at the start of a run from which the signals are zeroed [s]; the table does not move for the first 2 s."""
 
 BOUNDARIES = ("StepStarted", "StateChanged")
 """Events that end a dwell."""
@@ -88,7 +88,7 @@ class Cycles:
 
 
 class Dwells:
-    """Finds the measured cycles of a harmonic campaign in its data file."""
+    """Measured cycles of a harmonic campaign, from the raw channels of its data file."""
 
     def __init__(self, campaign: Campaign, signals: SignalMap) -> None:
         self._record, self._signals = campaign.record, signals
@@ -167,7 +167,7 @@ def measured_figure(motions: Sequence[MeasuredMotion]) -> "Figure":
 
 
 def _ends_of_dwells(record: DataFile) -> dict[tuple[float, float | None], list[float]]:
-    """Ends [s of bench time] of the dwells at each frequency and stiffness ratio (None for the bare frame).
+    """Ends [s of bench time] of the dwells by frequency [rad/s] and stiffness ratio (None for the bare frame).
 
     The running estimates identify the test; the dwell with the result follows the last estimate.
     """
@@ -184,8 +184,8 @@ def _ends_of_dwells(record: DataFile) -> dict[tuple[float, float | None], list[f
 
 
 def _in_phase(signals: Floats, period: float) -> Cycles | None:
-    """Means over short, equal parts of the period, starting at the first upward zero crossing of the table's
-    fundamental.
+    """Means over short, equal parts of the period, starting at the first upward zero crossing of the fundamental of the
+    table acceleration; None if more than half of the acceleration samples are missing.
     """
     acceleration = signals[:, ACCELERATION]
     known = np.isfinite(acceleration)

@@ -44,16 +44,16 @@ class Identification(Prepared[IdentifyParameters]):
 
     @cached_property
     def forecast(self) -> Forecast:
-        """Demands of the strongest multisine, known from its planning, since all motions are linear."""
+        """Demands of the strongest multisine, scaled from its plan, since all motions are linear."""
         self.progress("predicting the demands of the run")
         found = self._found
-        where = f"a multisine of {found.level:.3g} m/s2"
+        where = f"a multisine with a peak of {found.level:.3g} m/s2"
         demands = demands_of(found.demands, where, self.configuration)
         return Forecast(demands=demands, duration=expected_duration(self.parameters, found))
 
     @cached_property
     def prediction(self) -> Table:
-        """Requested motion of the table at each line."""
+        """Requested acceleration amplitude of the table at each line of the first multisine."""
         peak = np.abs(self._found.motions[0])
         return {
             "frequency": Column(self._found.grid.frequency, "Hz", "lines of the multisines"),

@@ -6,21 +6,21 @@ from sim.parameters import Parameters, quantity
 
 
 class IdentifiedBand(Parameters):
-    """Response of the table in a third-octave band; relative quantities are relative to its gain."""
+    """Response of the table in a third-octave band; relative quantities are referred to the gain of the band."""
 
     frequency_hz: float = quantity(..., "Hz", "centre frequency of the third-octave band")
-    gain_m_s2_v: float = quantity(..., "m/s2/V", "table acceleration per drive, rms over the lines")
+    gain_m_s2_v: float = quantity(..., "m/s2/V", "table acceleration per volt of drive, rms over the lines of the band")
     phase_rad: float = quantity(
         ..., "rad", "phase lead of the acceleration relative to the drive at the line nearest to the centre"
     )
     uncertainty: float = quantity(
-        ..., "1", "expanded relative uncertainty of a line (k = 2) due to noise and distortion"
+        ..., "1", "expanded relative uncertainty (k = 2) of a single line, due to noise and distortion"
     )
     distortion: float = quantity(
-        ..., "1", "relative standard deviation of a single realisation due to nonlinear distortion"
+        ..., "1", "relative standard deviation of a single realisation, due to nonlinear distortion"
     )
-    noise_m_s2_hz: float = quantity(..., "m/s2/Hz^0.5", "spectral density of the noise in the acceleration")
-    coherence: float = quantity(..., "1", "lowest fraction of the acceleration's power that is coherent with the drive")
+    noise_m_s2_hz: float = quantity(..., "m/s2/Hz^0.5", "amplitude spectral density of the acceleration noise")
+    coherence: float = quantity(..., "1", "lowest coherence of the acceleration with the drive in the band")
     lines: int = quantity(..., "1", "number of lines in the band")
 
 
@@ -28,9 +28,9 @@ PROTOCOL = Protocol(
     name="identify",
     summary="Identify the table: acceleration per volt of drive against frequency.",
     details=(
-        "Plays multisines with random phases at low level with the specimen on the table, after probes of "
-        "the unknown table, and separates response, noise and nonlinear distortion. The key `table_model` in "
-        "the configuration of other runs names the result, table_model.json. Without options, it identifies "
+        "Probes the unknown table, plays low-level multisines with random phases with the specimen on the "
+        "table, and separates response, noise and nonlinear distortion. The key `table_model` in the "
+        "configuration of other runs names the result, table_model.json. Without options, a run identifies "
         "the table with the bare frame, over the band required to replicate records."
     ),
     example="--config bench.toml --dry-run",

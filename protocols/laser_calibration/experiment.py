@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MARGIN = 1.05
-"""Factor on the requested amplitude; the larger amplitude must also be within the limits."""
+"""Safety factor: this multiple of the requested amplitude must be within the limits."""
 
 _COLUMNS = (
     TextColumn("sensor", words=True),
@@ -49,14 +49,14 @@ _COLUMNS = (
 )
 
 _CLAMP = (
-    "Remove spring and block from the table and clamp both storeys to it. Keep clear: the amplifier will be enabled."
+    "Remove the spring and the block, and clamp both storeys to the table. Keep clear: the amplifier will be enabled."
 )
 _UNCLAMP = "Remove the clamps from the storeys."
 
 
 class LaserCalibrationRun(Prepared[LaserCalibrationParameters]):
-    """Laser calibration. Raises InvalidInput for lasers that do not measure the table, and for motions beyond
-    limits.
+    """Laser calibration. Raises InvalidInput for lasers mounted on the table, a configuration that already includes a
+    calibration, and motions beyond the limits.
     """
 
     def __init__(
@@ -70,7 +70,7 @@ class LaserCalibrationRun(Prepared[LaserCalibrationParameters]):
             raise InvalidInput(
                 "lasers.reference",
                 "table",
-                "lasers on the table do not measure its motion: mount both on the ground, and set this to ground",
+                "lasers on the table do not measure its motion: mount both on the ground, and set this key to ground",
             )
         if configuration.calibrated is not None:
             raise InvalidInput(
@@ -116,7 +116,7 @@ class LaserCalibrationRun(Prepared[LaserCalibrationParameters]):
 
     @cached_property
     def prediction(self) -> Table:
-        """Planned passes."""
+        """Circular frequencies and amplitudes of the planned passes."""
         omega, amplitude = np.array(planned_passes(self.parameters)).T
         return {
             "omega": Column(omega, "rad/s", "circular frequency of each pass"),
@@ -129,7 +129,7 @@ class LaserCalibrationRun(Prepared[LaserCalibrationParameters]):
 
     def _steps(self) -> Generator[Step, Outcome, None]:
         """Steps: clamp the storeys to the table, measure, publish, remove the clamps. Raises Unmeasurable, after the
-        clamps are removed, if the response is insufficient.
+        clamps are removed, if the measurement fails.
         """
         bare = self.configuration.known_specimen.bare()
         yield OperatorAction(OperatorTask.LOCK_FRAME, bare, _CLAMP)
@@ -180,7 +180,7 @@ def _fit_event(name: str, curve: ErrorCurve, delay: float, uncertainty: float) -
 
 
 def _calibrated_sensors(found: LaserCalibration) -> Iterator[CalibratedSensor]:
-    """One result for each sensor, and one for the ratio of the lasers."""
+    """Results of both lasers, of their ratio, and of both sensors of the table."""
     for name, laser in (("laser_1", found.laser_1), ("laser_2", found.laser_2)):
         at = np.linspace(laser.lowest, laser.highest, 201)
         error = at - laser.corrected(at)

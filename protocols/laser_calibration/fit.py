@@ -1,10 +1,13 @@
 """Errors of the lasers from cycles of a common motion.
 
-Under a slow sine of the table with displacement x and velocity v, a laser's reading is r = x + e(r) - d v + c omega^2
-x. Here e is the laser's position-dependent error, d its delay, and c the effect of the clamps, which are compliant and
-accelerate the storeys; passes at two frequencies separate c from a scale error. The three are fitted by least squares
-to the mean cycles of the passes, at equal steps of the phase; e is a sum of Chebyshev polynomials of the reading. The
-table's motion need not be a pure sine, since both sensors measure it.
+During a slow sine of the table with displacement x and velocity v, a laser reads
+
+    r = x + e(r) - d v + c omega^2 x
+
+where e is the laser's position-dependent error, d its delay, and c the compliance of the clamps, which accelerate the
+storeys; passes at two frequencies separate c from a scale error. All three are fitted by least squares to the mean
+cycles of the passes, at equal steps of the phase; e is a sum of Chebyshev polynomials of the reading. The motion need
+not be a pure sine, since the laser and the table's sensor measure the same motion.
 
 The order is chosen by cross-validation. It is the lowest order whose curves, fitted to all passes but one, predict the
 omitted pass as well as the best order does, within one standard error. The uncertainty of the curve combines the
@@ -55,9 +58,9 @@ class Pass:
 @dataclass(frozen=True, eq=False)
 class ErrorCurve:
     """Error curve of one laser relative to the measured table displacement: Chebyshev coefficients `error` [m] over the
-    readings from `low` to `high` [m], and `delay` [s]. `scores` are the rms prediction errors [m] of the orders from 1
-    on; `residual` [m] is the rms contribution of higher orders. `without`, shape (passes, READINGS) [m], are the
-    curves, and `delays` [s] the delays, fitted without each pass in turn.
+    readings from `low` to `high` [m], and `delay` [s]. `scores` [m], shape (HIGHEST,), are the rms prediction errors of
+    the orders 1 to HIGHEST; `residual` [m] is the rms contribution of higher orders. `without` [m], shape (passes,
+    READINGS), are the curves, and `delays` [s], shape (passes,), the delays, fitted without each pass in turn.
     """
 
     low: float
@@ -78,7 +81,7 @@ class ErrorCurve:
 
     @property
     def slope(self) -> float:
-        """Relative excess of the span of the readings over the span of the displacement."""
+        """Change of the error from `low` to `high`, relative to the span of the readings."""
         ends = chebyshev.chebval(np.array([-1.0, 1.0]), self.error)
         return float(ends[1] - ends[0]) / (self.high - self.low)
 
@@ -90,7 +93,7 @@ class ErrorCurve:
 
 
 def jackknife(found: Array) -> float:
-    """Jackknife standard uncertainty of a value from n passes, from the estimates without each one, shape (n,)."""
+    """Jackknife standard uncertainty of a value, from its estimates with one of the n passes omitted, shape (n,)."""
     return sqrt((found.size - 1) / found.size * float(np.sum((found - found.mean()) ** 2)))
 
 
@@ -126,7 +129,7 @@ def fit_curve(passes: Sequence[Pass], laser: int, rest: float) -> ErrorCurve:
 
     def missed(order: int, out: int) -> float:
         wrong = errors[out] - rows[out][:, [*range(order + 1), -2, -1]] @ solved(order, out)
-        # the zero is rounded differently in each pass
+        # the variance excludes the mean, since quantisation shifts the zero differently in each pass
         return float(np.var(wrong))
 
     squares: Array = np.array([[missed(order, out) for out in every] for order in range(1, HIGHEST + 1)])
@@ -167,7 +170,7 @@ def calibration(
     and `ranges` [m] are taken from the lasers' data sheets.
     """
     slopes = [curve.slope for curve in curves]
-    # ratio of the true displacement, according to the mean span of the lasers, to the measured one
+    # ratio of the true displacement (mean span of the lasers) to the one measured by the table's sensor
     factor = 1.0 / (1.0 - 0.5 * sum(slopes))
     found = [
         LaserCurve(
@@ -187,7 +190,7 @@ def calibration(
     ratios = np.array([each.ratio for each in passes])
     standard = np.sqrt(np.mean([_span_uncertainty(span, accuracy, whole) ** 2 for whole in ranges]) / 2.0)
     scatter = np.hypot(np.std(ratios, ddof=1) / sqrt(len(passes)), jackknife((curves[0].slopes + curves[1].slopes) / 2))
-    # the uncertainty of the curves includes their slope
+    # an error of the curves also changes their slopes
     bent = np.hypot(curves[0].uncertainty, curves[1].uncertainty) / (0.5 * span)
     return LaserCalibration(
         date=date,
@@ -213,8 +216,8 @@ def _span_uncertainty(span: float, accuracy: SensorAccuracy, whole: float) -> fl
 
 
 def _rescaled(curve: ErrorCurve, factor: float) -> Array:
-    """Coefficients of the error relative to the true displacement, which is `factor` times the measured one: r - factor
-    * (r - e).
+    """Coefficients of the error relative to the true displacement, which is `factor` times the measured displacement:
+    r - factor * (r - e).
     """
     error = factor * curve.error
     error[:2] += (1.0 - factor) * np.array([0.5 * (curve.high + curve.low), 0.5 * (curve.high - curve.low)])
@@ -222,7 +225,7 @@ def _rescaled(curve: ErrorCurve, factor: float) -> Array:
 
 
 def _columns(readings: Array, each: Pass, low: float, high: float) -> Array:
-    """Chebyshev polynomials up to HIGHEST, effect of a delay, effect of compliant clamps, shape (k, HIGHEST + 3)."""
+    """Columns of the fit: Chebyshev polynomials up to HIGHEST, delay, compliance of the clamps; (k, HIGHEST + 3)."""
     place = (2.0 * readings - high - low) / (high - low)
     columns = (chebyshev.chebvander(place, HIGHEST), -each.speed, each.omega**2 * each.displacement)
     return np.column_stack(columns).astype(np.float64)

@@ -1,4 +1,4 @@
-"""Live view of the laser calibration: error of each laser over its range, and its residuals."""
+"""Live view of the laser calibration: error of each laser over its range, and its change without each pass."""
 
 import numpy as np
 
@@ -18,8 +18,8 @@ def error_view(run: LiveRun) -> LiveView:
     residuals = Panel(
         "residuals",
         ("reading", "m"),
-        ("without a pass − all", "um"),
-        awaits="The changes of the errors when one of the passes is omitted appear here.",
+        ("change without one pass", "um"),
+        awaits="The change of each error when one of the passes is omitted appears here.",
     )
     found = {fit.name: fit.columns for fit in run.fits}
     for laser in LASERS:

@@ -67,7 +67,7 @@ def expected_duration(parameters: LaserCalibrationParameters) -> float:
 
 
 def _measuring(parameters: LaserCalibrationParameters, after: int = 0) -> float:
-    """Expected duration of the passes after the first `after`, of the last ramp and of the computation [s]."""
+    """Expected duration of the passes after number `after`, including the last ramp and the computation [s]."""
     lengths = [CHANGE + (SETTLING + parameters.cycles) * tau / omega for omega, _ in planned_passes(parameters)]
     return sum(lengths[after:]) + (END if after < len(lengths) else 0.0)
 
@@ -76,7 +76,7 @@ def measure(
     parameters: LaserCalibrationParameters, configuration: BenchConfiguration
 ) -> Generator[Step, Outcome, tuple[LaserCalibration, tuple[ErrorCurve, ErrorCurve]]]:
     """Steps of the measurement with the clamped frame; returns the calibration and the error curves of the lasers."""
-    yield Publish(StepStarted("acquire the lasers at rest"))
+    yield Publish(StepStarted("acquire the laser signals at rest"))
     at_rest = yield AcquireAtRest(REST)
     if not isinstance(at_rest, RestSamples):
         raise TypeError(f"the acquisition at rest ended with {at_rest}")
@@ -139,7 +139,7 @@ def _passes(parameters: LaserCalibrationParameters) -> Generator[Step, Outcome, 
 
 
 def _progress(parameters: LaserCalibrationParameters, finished: int, activity: str) -> Progress:
-    """Progress after `finished` passes, from the remaining duration of the plan."""
+    """Progress after `finished` passes, from the expected duration of the remaining ones."""
     left = _measuring(parameters, finished)
     return Progress(1.0 - left / expected_duration(parameters), left, activity)
 

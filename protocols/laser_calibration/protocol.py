@@ -8,7 +8,7 @@ class LaserCalibrationParameters(Parameters):
     """Slow sines of the table with the frame locked to it, so that all sensors measure the same motion."""
 
     amplitude: float = quantity(
-        0.050, "m", "amplitude of the first pass; readings beyond it remain uncalibrated", gt=0.001, le=1
+        0.050, "m", "amplitude of the first pass; only readings covered by all passes are calibrated", gt=0.001, le=1
     )
     omega: float = quantity(
         8.0,
@@ -21,7 +21,7 @@ class LaserCalibrationParameters(Parameters):
     passes: int = quantity(
         8,
         "1",
-        "number of passes, each 1 % smaller than the previous one, so that quantisation errors differ",
+        "number of passes; the amplitude decreases by 1 % per pass, so that quantisation errors differ",
         ge=6,
         le=20,
     )
@@ -37,8 +37,8 @@ class LaserCalibrationParameters(Parameters):
 
 
 class CalibratedSensor(Parameters):
-    """A sensor compared with the mean span of both lasers. Values that do not apply are absent. Uncertainties are
-    expanded (k = 2).
+    """Calibration of a sensor relative to the mean span of both lasers. Values that do not apply are absent.
+    Uncertainties are expanded (k = 2).
     """
 
     sensor: str = quantity(..., "", "channel, or laser_2 / laser_1 for the ratio of the lasers")

@@ -65,7 +65,9 @@ class StabilityTest(Prepared[StabilityParameters]):
             amplitude = place.factor * self._specimen.uplift_acceleration
             orbit = rocking(self._specimen, place.omega, amplitude)
             if orbit is None:
-                raise InvalidInput("omega", place.omega, "the model has no rocking orbit at this frequency")
+                raise InvalidInput(
+                    "omega", place.omega, "the model has no rocking orbit at this frequency and amplitude"
+                )
             found[place] = plan_starts(
                 self._specimen, place.omega, amplitude, orbit, self.parameters.starts, self.configuration.known
             )
@@ -94,7 +96,7 @@ class StabilityTest(Prepared[StabilityParameters]):
             cycles = 2.0 * PATIENCE + DEFLECTION + p.released_cycles + p.measured_cycles
             longest = p.settle_limit + cycles * tau / place.omega
             for number, start in enumerate(planned, 1):
-                name = f"start {number} at {place.omega:g} rad/s and {place.factor:g} of the uplift acceleration"
+                name = f"start {number} at {place.omega:g} rad/s and {place.factor:g} times the uplift acceleration"
                 stage = Stage(name, start.segments, start.chance)
                 yield Trial(stage, self._specimen, (), HOLD, longest, p.beta, None, p.hold_authority)
             for other in self._neighbours(place) if p.bisect else ():
@@ -103,7 +105,7 @@ class StabilityTest(Prepared[StabilityParameters]):
                 segments = (*start.segments, Segment(SWEEP_TIME, amplitude, other.omega))
                 name = f"sweep from {place.omega:g} to {other.omega:g} rad/s"
                 if other.factor != place.factor:
-                    name = f"change from {place.factor:g} to {other.factor:g} of the uplift acceleration"
+                    name = f"amplitude change from {place.factor:g} to {other.factor:g} times the uplift acceleration"
                 yield Trial(Stage(name, segments), self._specimen, (), HOLD, longest, p.beta, None, p.hold_authority)
 
     def _neighbours(self, place: Place) -> list[Place]:
@@ -138,10 +140,14 @@ class StabilityTest(Prepared[StabilityParameters]):
             "amplitude_factor": Column(
                 np.array([each.factor for each in places]), "1", "amplitude relative to the uplift acceleration"
             ),
-            "fixed_modulus": Column(np.abs(fixed), "1", "greatest |Floquet multiplier| on fixed ground"),
-            "fixed_angle_rad": Column(np.abs(np.angle(fixed)), "rad", "argument of this multiplier on fixed ground"),
-            "table_modulus": Column(np.abs(table), "1", "greatest |Floquet multiplier| on the simulated table"),
-            "table_angle_rad": Column(np.abs(np.angle(table)), "rad", "argument of this multiplier on the table"),
+            "fixed_modulus": Column(np.abs(fixed), "1", "modulus of the dominant multiplier on fixed ground"),
+            "fixed_angle_rad": Column(
+                np.abs(np.angle(fixed)), "rad", "argument of the dominant multiplier, fixed ground"
+            ),
+            "table_modulus": Column(np.abs(table), "1", "modulus of the dominant multiplier on the simulated table"),
+            "table_angle_rad": Column(
+                np.abs(np.angle(table)), "rad", "argument of the dominant multiplier, simulated table"
+            ),
         }
 
     def _curve(self) -> list[Place]:

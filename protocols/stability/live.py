@@ -9,7 +9,7 @@ CIRCLE = np.linspace(0.0, 2.0 * np.pi, 181)
 
 
 def multiplier_view(run: LiveRun) -> LiveView:
-    """Measured and predicted multipliers; the unit circle, and the modulus 1, are the boundary of stability."""
+    """Measured and predicted multipliers; the boundary of stability is the unit circle (modulus 1)."""
     by_amplitude = len(run.parameters.amplitude_factor) > 1
     place, axis = (
         ("amplitude_factor", ("amplitude factor", "1")) if by_amplitude else ("omega_rad_s", ("omega", "rad/s"))

@@ -2,8 +2,8 @@
 
 1. Bare frame: calibrate the drive. Mount the spring: calibrate again with the block at rest.
 2. At each point: try the planned starts, control the amplitude, hold the motion on its orbit, deflect and release it.
-3. Between adjacent points on both sides of the boundary: the same, at the middle of the interval, after the start of
-   the nearest planned point and a sweep from there.
+3. Between adjacent points on either side of the boundary: bisect. The motion is started at the nearest planned point,
+   swept to the middle of the interval, and measured as in step 2.
 """
 
 from cmath import phase
@@ -47,13 +47,13 @@ class Place:
     factor: float
 
     def along(self, by_amplitude: bool) -> float:
-        """Its position on the axis of the test."""
+        """Coordinate on the axis of the test: `factor` if the amplitude is varied, otherwise `omega` [rad/s]."""
         return self.factor if by_amplitude else self.omega
 
 
 @dataclass(frozen=True)
 class _Trial:
-    """A motion before its hold, and its orbit, prediction and stabiliser."""
+    """A motion to be held: its point, sine, prediction and stabiliser."""
 
     place: Place
     sine: Sine
@@ -62,7 +62,7 @@ class _Trial:
 
 
 class StabilityPlan:
-    """Steps of the test."""
+    """Steps of a stability test, and the points measured so far."""
 
     def __init__(
         self,
@@ -75,7 +75,7 @@ class StabilityPlan:
         self._by_amplitude = len(parameters.amplitude_factor) > 1
         self._pace = Pace(tuple(place.omega for place in starts), 1)
         self.points: list[StabilityPoint] = []
-        """Points so far."""
+        """Points finished so far, in the order of measurement."""
 
     def steps(self) -> Generator[Step, Outcome, Sequence[StabilityPoint]]:
         """Steps of the complete test; returns its points."""
@@ -121,7 +121,7 @@ class StabilityPlan:
                 return
 
     def next_middle(self) -> Place | None:
-        """Middle of the widest bracket of a boundary that is still too wide; None if there is none."""
+        """Middle of the widest bracket of a boundary; None if no bracket is wider than the parameter `bracket`."""
         known = sorted((each for each in self.points if each.modulus is not None), key=self._position)
         open_brackets = [
             (b - a, 0.5 * (a + b))
@@ -146,14 +146,16 @@ class StabilityPlan:
     def _point(
         self, place: Place, starts: Sequence[Start], calibration: DriveCalibration
     ) -> Generator[Step, Outcome, StabilityPoint]:
-        """Try the starts until the orbit was held and a multiplier determined."""
+        """Try the starts until one yields a multiplier; returns its point, otherwise that of the last motion held."""
         p, configuration, specimen = self._parameters, self._configuration, self._specimen
         amplitude, shaker = place.factor * specimen.uplift_acceleration, configuration.simulated_shaker
         fields: dict[str, Any] = {"omega_rad_s": place.omega, "amplitude_factor": place.factor, "beta": p.beta}
         orbit = rocking(specimen, place.omega, amplitude)
         design = prepared(orbit, shaker, p.harmonics)
         if orbit is None or design is None:
-            reason = "the model has no rocking orbit here" if orbit is None else "no control stabilises the orbit"
+            reason = (
+                "the model has no rocking orbit at this point" if orbit is None else "no control stabilises the orbit"
+            )
             return StabilityPoint(**fields, status=OrbitStatus.NOT_HELD, reason=reason)
         found = predicted(orbit, configuration.known_on_table, shaker, p.harmonics)
         fields |= {**_predicted_fields(found), "reason": close_pair(orbit)}
@@ -175,7 +177,7 @@ class StabilityPlan:
             if point.status is OrbitStatus.MEASURED:
                 return last
         if last.status is OrbitStatus.OVERTURNED:
-            update = {"starts_tried": falls, "reason": f"the block fell in all {falls} starts"}
+            update = {"starts_tried": falls, "reason": f"the block fell after every start ({falls} tried)"}
             return last.model_copy(update=update)
         return last
 
@@ -216,7 +218,9 @@ class StabilityPlan:
             "captured_cycles": held.captured,
         }
         if found is None:
-            reason = f"no multiplier can be determined from {len(released.series)} cycles after the release"
+            reason = (
+                f"no multiplier can be determined from the cycles after the release ({len(released.series)} measured)"
+            )
             return StabilityPoint.model_validate({**values, "status": OrbitStatus.NOT_MEASURABLE, "reason": reason})
         scale = self._configuration.sensors.table_scale
         parts, turned = parts_of(found, trial.predicted.slope, scale), trial.predicted.turn * scale
@@ -267,4 +271,4 @@ def _predicted_fields(found: Predicted) -> dict[str, Any]:
 
 
 def _text(omega: float, factor: float) -> str:
-    return f"{omega:.4g} rad/s at {factor:.4g} of the uplift acceleration"
+    return f"{omega:.4g} rad/s at {factor:.4g} times the uplift acceleration"

@@ -1,4 +1,4 @@
-"""Predicted multipliers of a stability test, and the places at which the predicted or measured modulus passes 1."""
+"""Predicted multipliers of a stability test, and the boundaries where the predicted or measured modulus crosses 1."""
 
 from cmath import phase
 from collections.abc import Sequence
@@ -19,17 +19,17 @@ from sim.table_orbit import table_orbit
 Array = NDArray[np.float64]
 
 STEP = 0.002
-"""Relative change of the amplitude in the finite difference of its sensitivity."""
+"""Relative change of the amplitude in the finite difference for the sensitivity."""
 
 CLOSE = 0.02
-"""Difference of the moduli of two pairs below which the uncertainty of a specimen may exchange their order."""
+"""Difference between the moduli of two pairs of multipliers up to which either may dominate in the actual specimen."""
 
 
 @dataclass(frozen=True)
 class Predicted:
-    """Multipliers of an orbit: on `fixed` ground and, if the shaker is known, on the `table`; `uncertainty` is the
-    standard uncertainty of the modulus due to the specimen. `slope` and `turn` [rad] are the derivatives of modulus and
-    angle with respect to the logarithm of the amplitude; all three are for fixed ground.
+    """Dominant multiplier of an orbit: on `fixed` ground and, if the shaker is known, on the `table`. On fixed ground,
+    `uncertainty` is the standard uncertainty of the modulus due to the specimen, and `slope` and `turn` [rad] are the
+    derivatives of modulus and angle with respect to the logarithm of the amplitude.
     """
 
     fixed: complex
@@ -52,15 +52,15 @@ def rocking(specimen: Specimen, omega: float, amplitude: float) -> Orbit | None:
 
 def close_pair(orbit: Orbit) -> str:
     """Remark on a second pair of multipliers on fixed ground whose modulus differs by at most `CLOSE` from that of the
-    slowest one; empty if there is none.
+    dominant pair; empty if there is none.
     """
     slowest = orbit.slowest
     others = [complex(each) for each in orbit.multipliers if each.imag > 0.0 and abs(each - slowest) > 1e-9]
     if not others or abs(second := max(others, key=abs)) < abs(slowest) - CLOSE:
         return ""
     return (
-        f"the model has a second pair of modulus {abs(second):.4f} at {degrees(phase(second)):.1f} degrees: the actual "
-        "specimen may have the slower pair there, which was not deflected"
+        f"the model has a second pair of multipliers, modulus {abs(second):.4f} at {degrees(phase(second)):.1f} "
+        "degrees, which was not deflected but may be the dominant one of the actual specimen"
     )
 
 
@@ -75,7 +75,7 @@ def on_table(orbit: Orbit, shaker: Shaker | None, harmonics: int) -> complex | N
 
 
 def predicted(orbit: Orbit, known: SpecimenKnowledge, shaker: Shaker | None, harmonics: int) -> Predicted:
-    """Multipliers of `orbit`; the uncertainty is to first order along independent directions (GUM 5.1.4, note 2)."""
+    """Multiplier of `orbit`; its uncertainty is propagated to first order (GUM 5.1.4, note 2)."""
     sides = [(_slowest(more, orbit), _slowest(less, orbit)) for more, less in known.deviations(orbit.specimen)]
     more, less = (_slowest(orbit.specimen, orbit, 1.0 + step) for step in (STEP, -STEP))
     return Predicted(
@@ -97,8 +97,8 @@ def _slowest(specimen: Specimen, orbit: Orbit, factor: float = 1.0) -> complex:
 
 @dataclass(frozen=True)
 class Boundary:
-    """A place, frequency or amplitude, at which the modulus of the dominant multiplier passes 1, with its expanded
-    uncertainty (k = 2), between the measured places `low` and `high`.
+    """A frequency or amplitude `place` at which the modulus of the dominant multiplier crosses 1, with its expanded
+    uncertainty (k = 2), between the adjacent points `low` and `high`.
     """
 
     place: float
@@ -133,7 +133,7 @@ def boundaries(places: Sequence[float], moduli: Sequence[float], uncertainties: 
 
 
 def _bend(x: Array, y: Array, k: int, place: float) -> float:
-    """Difference of quadratic and linear interpolation at `place` between x[k] and x[k + 1]."""
+    """Quadratic minus linear interpolation at `place`, between x[k] and x[k + 1]; 0 without a third point."""
     others = [j for j in range(x.size) if j not in (k, k + 1)]
     if not others:
         return 0.0

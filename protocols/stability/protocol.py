@@ -15,19 +15,19 @@ Factor = Annotated[float, Field(ge=0.1, le=5)]
 
 
 class StabilityPoints(Parameters):
-    """Points of a stability test."""
+    """Test points of a stability test: frequencies, amplitudes and stiffness ratio."""
 
     omega: tuple[Frequency, ...] = quantity(
         (15.0, 15.2, 15.4, 15.6),
         "rad/s",
-        "circular frequencies of the base motion; several only at a single amplitude",
+        "circular frequencies of the base motion; more than one requires a single amplitude",
         min_length=1,
     )
     amplitude_factor: tuple[Factor, ...] = quantity(
         (1.01,),
         "1",
-        "amplitudes of the table acceleration, relative to the uplift acceleration g/lambda; several only at a single "
-        "frequency",
+        "amplitudes of the table acceleration, relative to the uplift acceleration g/lambda; more than one requires a "
+        "single frequency",
         min_length=1,
     )
     beta: float = quantity(0.97, "1", "stiffness ratio k_C/k1 of the coupling spring", gt=0, le=100, usual=COUPLING)
@@ -36,17 +36,17 @@ class StabilityPoints(Parameters):
 
 
 class StabilityParameters(SineParameters, StabilityPoints):
-    """Orbits held at one spring, over frequency or amplitude, then released to measure their multipliers."""
+    """Orbits with one spring, over frequency or amplitude, held and then released to measure their multipliers."""
 
     settle_limit: float = quantity(30.0, "s", "longest wait for the steady state before the hold", gt=0, le=3600)
     released_cycles: int = quantity(60, "1", "largest number of cycles observed after the release", ge=24, le=1000)
     bisect: bool = quantity(
-        True, "", "whether further points are measured between those between which the stability changes"
+        True, "", "whether the interval between a stable and an unstable neighbour is bisected by further points"
     )
     bracket: float = quantity(
         0.003,
         "1",
-        "distance of these points, relative to their frequency or amplitude, at which the bisection ends",
+        "width of the bisected interval, relative to its middle, at which the bisection ends",
         ge=1e-4,
         le=0.5,
     )
@@ -86,13 +86,13 @@ class StabilityPoint(Parameters):
     status: OrbitStatus = quantity(..., "", "outcome of the point")
     bisected: bool = quantity(False, "", "whether the point was added by the bisection")
     modulus: float | None = quantity(
-        None, "1", "modulus of the dominant multiplier: fraction of a deviation that remains after a cycle"
+        None, "1", "modulus of the dominant multiplier: factor by which a deviation changes per cycle"
     )
     modulus_uncertainty: float | None = quantity(None, "1", f"{_EXPANDED} of the modulus")
     angle_rad: float | None = quantity(None, "rad", "argument of the multiplier: rotation of the deviation in a cycle")
     angle_uncertainty_rad: float | None = quantity(None, "rad", f"{_EXPANDED} of the angle")
     modulus_predicted: float | None = quantity(
-        None, "1", "predicted modulus on the simulated table; with hardware, on fixed ground"
+        None, "1", "predicted modulus: on the simulated table, or on fixed ground for any other table"
     )
     modulus_predicted_uncertainty: float | None = quantity(
         None, "1", f"{_EXPANDED} of the predicted modulus, due to the specimen"
@@ -100,7 +100,9 @@ class StabilityPoint(Parameters):
     angle_predicted_rad: float | None = quantity(None, "rad", "predicted argument of the multiplier")
     fixed_modulus: float | None = quantity(None, "1", "predicted modulus on fixed ground")
     agrees: bool | None = quantity(
-        None, "1", "whether the moduli differ by no more than their combined uncertainty (root sum of squares)"
+        None,
+        "1",
+        "whether modulus and prediction differ by no more than their combined uncertainty (root sum of squares)",
     )
     uncertainty_parts: str = quantity(
         "", "", "standard uncertainty of the modulus by contribution, largest first, as JSON"
@@ -110,7 +112,7 @@ class StabilityPoint(Parameters):
     autocorrelation: float | None = quantity(
         None, "1", "correlation of the residuals of successive cycles; near 0 if the fit describes the motion"
     )
-    residual_m: float | None = quantity(None, "m", "rms residual of a Fourier coefficient of u1 or drift")
+    residual_m: float | None = quantity(None, "m", "rms residual of the fitted Fourier coefficients of u1 and drift")
     drift_peak_m: float | None = quantity(None, "m", "peak drift of the held orbit")
     amplitude_m_s2: float | None = quantity(None, "m/s2", "achieved amplitude of the table on the held orbit")
     amplitude_slope: float | None = quantity(
@@ -126,12 +128,12 @@ class StabilityPoint(Parameters):
 
 PROTOCOL = Protocol(
     name="stability",
-    summary="Multipliers of rocking orbits, stable or not, and the boundary between them, against prediction.",
+    summary="Multipliers of stable and unstable rocking orbits, and the stability boundary, against prediction.",
     details=(
         "At each frequency or amplitude, the rocking motion is held on its orbit by small corrections once per cycle, "
         "deflected slightly and released. The growth or decay of the deviation gives the modulus and angle of the "
-        "dominant multiplier. Where the modulus passes 1 between two points, further points bisect the interval. "
-        "Without options, it brackets the upper end of the unstable window at beta 0.97 on the simulated bench."
+        "dominant multiplier. Where the modulus crosses 1 between two points, further points bisect the interval. "
+        "Without options, a run brackets the upper end of the unstable window at beta 0.97 on the simulated bench."
     ),
     example="--beta 0.97 --omega 15:15.6:4 --yes",
     parameters=StabilityParameters,

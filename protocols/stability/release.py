@@ -1,4 +1,4 @@
-"""Release of a held motion: a deflection along the slowest pair of multipliers, and the free cycles after it."""
+"""Release of a held motion: a deflection along the dominant pair of multipliers, and the free cycles after it."""
 
 from collections.abc import Generator
 from dataclasses import dataclass
@@ -19,8 +19,8 @@ from sim.cycle_map import CycleMap
 Array = NDArray[np.float64]
 
 DEFLECTION = 8
-"""Number of cycles in which the motion is deflected. At least as many controls as half the states of table and
-specimen are required to leave the other multipliers unexcited; a larger number permits smaller controls.
+"""Number of cycles in which the motion is deflected. At least half as many controls as the table and the specimen
+have states are required to leave the other multipliers unexcited; a larger number permits smaller controls.
 """
 
 START, LEAST = 0.7, 0.02
@@ -48,7 +48,7 @@ class Released:
 def deflection(found: CycleMap, cycles: int, authority: float) -> NDArray[np.complex128]:
     """Controls of the cycles before a release, shape (DEFLECTION,), of at most `authority`.
 
-    The deviation at the release is such that it remains linear for about `cycles` cycles.
+    The deviation at the release is chosen so that the motion remains linear for about `cycles` cycles.
     """
     controls, effect = found.excitation(DEFLECTION)
     share = np.clip(abs(found.slowest) ** -float(cycles), LEAST / BOUND, START)
@@ -76,7 +76,7 @@ def release(
         outcome = yield Dwell(1)
         if not isinstance(outcome, Measured):
             return Fallen()
-        # a correction takes effect one cycle after the one that is measured next
+        # a control that is set before a cycle takes effect in the following cycle
         played = abs(controls[number - 1]) if 0 < number <= len(controls) else 0.0
         for cycle in outcome.cycles:
             y = observed(cycle, table.turn)
@@ -87,14 +87,14 @@ def release(
             if deviation > LOST * BOUND or drift > largest:
                 return Released(np.array(rows).reshape(-1, orbit.size), orbit)
         if not outcome.cycles and number > len(controls):
-            # the fit requires successive cycles
+            # the fit requires consecutive cycles
             break
     return Released(np.array(rows).reshape(-1, orbit.size), orbit)
 
 
 def parts_of(found: Multiplier, amplitude_slope: float, table_scale: float) -> dict[str, float]:
-    """Standard uncertainties of the modulus by contribution, largest first: noise of the cycles, and the amplitude of
-    the table, of which `table_scale` is the relative standard uncertainty. The latter is 0 for an unknown slope (NaN).
+    """Standard uncertainties of the modulus by contribution, largest first: scatter of the cycles, and amplitude of the
+    table with the relative standard uncertainty `table_scale`. The second is 0 for an unknown `amplitude_slope` (NaN).
     """
     slope = 0.0 if amplitude_slope != amplitude_slope else abs(amplitude_slope)
     parts = {

@@ -44,7 +44,7 @@ _COLUMNS = (
 
 
 def by_amplitude(points: Sequence[StabilityPoint]) -> bool:
-    """Whether the test is over amplitude; otherwise it is over frequency."""
+    """Whether the test varies the amplitude; otherwise it varies the frequency."""
     return len({point.amplitude_factor for point in points}) > 1
 
 
@@ -60,7 +60,7 @@ def measured_boundaries(points: Sequence[StabilityPoint]) -> list[Boundary]:
 
 
 def predicted_boundaries(curve: Curve, ground: str) -> list[float]:
-    """Places at which a predicted curve passes 1; `ground` is "fixed" or "table"."""
+    """Frequencies [rad/s] or amplitude factors where a predicted modulus crosses 1; `ground` is "fixed" or "table"."""
     over = np.unique(curve["amplitude_factor"]).size > 1
     places, moduli = curve["amplitude_factor" if over else "omega_rad_s"], curve[f"{ground}_modulus"]
     return [each.place for each in boundaries(places.tolist(), moduli.tolist(), [0.0] * len(places))]

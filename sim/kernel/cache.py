@@ -1,9 +1,9 @@
 """Folder of the kernel's compiled code, named after a hash of its sources and writable only by this user.
 
 By itself, numba checks only the source file of the compiled function, so that a caller in another file would keep an
-outdated callee, and uses a folder in the user's home if the folder of the source file is not writable. Here the hash is
-in the name of every folder. The cached files are pickles, which execute code when loaded; therefore a folder to which
-others can write is not used.
+outdated callee, and uses a folder in the user's home if the folder of the source file is not writable. Here, the name
+of every folder contains the hash of all sources. The cached files are pickles, which execute code when loaded;
+therefore a folder to which others can write is not used.
 """
 
 import hashlib
@@ -22,26 +22,26 @@ if sys.platform != "win32":
     import pwd
 
 KEPT = 6
-"""Number of unused folders of other kernel versions that are kept, so that a return to one needs no compilation."""
+"""Number of unused folders of other kernel versions that are kept, so that they need no recompilation."""
 
 PREFIX = "rockbench-"
 IN_USE = "in-use"
 """File that every process using the folder keeps open; its modification time is that of the last use."""
 
 TOLD = "ROCKBENCH_KERNEL_IN_MEMORY"
-"""Environment variable that keeps child processes from repeating the notice."""
+"""Environment variable that keeps child processes from repeating the notice on standard error."""
 
 
 KERNEL = Path(__file__).parent
 
 
 class KernelCache:
-    """Finds the folder for the compiled kernel once, and stops using it if it fails.
+    """Folder for compiled code: chosen once, and abandoned for compilation in memory if it cannot be used.
 
     given : folder that the user set for numba's caches; if empty, the installation's or the user's cache folder is
     used.
-    versions : further dependencies of the compiled code.
-    sources : folder of the source files of the compiled functions, the kernel's own or another one.
+    versions : versions and settings of the compiler, which are included in the hash.
+    sources : folder of the source files of the compiled functions, that of the kernel or another one.
     """
 
     def __init__(self, given: str, versions: Sequence[object], sources: Path = KERNEL) -> None:
@@ -84,7 +84,7 @@ class KernelCache:
         )
 
     def release(self) -> None:
-        """Close the file that prevents the removal of the folder once it is old."""
+        """Close the file whose lock protects the folder from removal."""
         if self._handle is not None:
             os.close(self._handle)
             self._handle = None
@@ -101,7 +101,7 @@ def _say(what: str) -> None:
 
 
 def _stamp(folder: Path) -> list[tuple[str, int, int]]:
-    # compared before each function is loaded: an update during loading would mix two versions
+    # compared before each function is loaded: an update of the sources during loading would mix two versions
     with suppress(OSError), os.scandir(folder) as entries:
         sources = [entry for entry in entries if entry.name.endswith(".py")]
         return sorted((entry.name, entry.stat().st_mtime_ns, entry.stat().st_size) for entry in sources)
@@ -124,7 +124,7 @@ def _places(sources: Path) -> list[Path]:
 
 
 def _claim(base: Path, name: str) -> tuple[Path, int]:
-    """Create or reuse the folder `name` in `base`. Returns it with the open file that prevents its removal.
+    """Create or reuse the folder `name` in `base`. Returns it and the handle of the file that prevents its removal.
 
     Raises OSError with the reason if this fails.
     """
@@ -156,7 +156,7 @@ def _claim(base: Path, name: str) -> tuple[Path, int]:
 
 def _hold(handle: int, path: Path) -> bool:
     """Mark the open file as in use. Returns False if `path` is no longer this file."""
-    with suppress(OSError):  # a file system without locks: no folder is removed there either
+    with suppress(OSError):  # without locks, no folder is removed either
         if sys.platform != "win32":
             fcntl.flock(handle, fcntl.LOCK_SH)
     with suppress(OSError):
@@ -166,7 +166,7 @@ def _hold(handle: int, path: Path) -> bool:
 
 
 def _remove_old(base: Path, own: Path) -> None:
-    """Remove all folders in `base` except those in use and the last KEPT that were used."""
+    """Remove the unused folders in `base`, except `own` and the `KEPT` most recently used ones."""
     with suppress(OSError):
         others = [(_last_use(path), path) for path in base.glob(f"{PREFIX}*") if path != own]
         for _, path in sorted(others, reverse=True)[KEPT:]:
@@ -195,7 +195,10 @@ def _remove_unused(folder: Path) -> None:
 
 
 def _require_private(path: Path, *, parents: bool) -> None:
-    """Raise OSError if a user other than root could put files there. User folders of Windows are already private."""
+    """Raise OSError if a user other than root could write to `path` or, with `parents`, to a folder above it.
+
+    User folders of Windows are private by default.
+    """
     if sys.platform == "win32":
         return
     info = path.lstat()
@@ -213,7 +216,7 @@ def _others_write(info: os.stat_result, is_parent: bool) -> bool:
     if sys.platform == "win32":
         return False
     if is_parent and info.st_mode & stat.S_ISVTX:
-        return False  # others cannot replace its contents, and its contents are checked separately
+        return False  # sticky bit: others cannot replace the contents, which are checked separately
     if info.st_mode & stat.S_IWOTH:
         return True
     return bool(info.st_mode & stat.S_IWGRP) and not (is_parent and _own_group(info.st_gid))

@@ -60,14 +60,14 @@ def compiled(signature: str) -> Callable[[F], F]:
             cache = _cache_of(function)
             folder = cache.folder()
             if folder is not None:
-                # numba reads this for each function; it is set only for the kernel's, so that other code keeps its
-                # cache
+                # numba reads this setting for each function; it is changed only for functions compiled here, so that
+                # other code keeps its cache
                 before, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(folder)
                 try:
                     made = _njit(signature, function, cache=True)
                     if _is_within(made, folder):
                         return made
-                    cache.give_up(f"numba cannot or may not use {folder}")
+                    cache.give_up(f"numba does not use {folder}")
                 except numba.core.errors.NumbaError:
                     raise
                 except Exception as error:

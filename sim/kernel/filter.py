@@ -28,7 +28,7 @@ def cascade(sections: NDArray[np.float64], state: NDArray[np.float64], volts: ND
 
 @compiled("void(float64[::1], float64, float64[::1])")
 def exponential_mean(values: NDArray[np.float64], forget: float, state: NDArray[np.float64]) -> None:
-    """Replace `values`, shape (n,), by their running mean. Updates the `state`, shape (1,): `forget` times the mean."""
+    """Replace `values`, shape (n,), by their exponential mean; `state`, shape (1,), is `forget` times the last mean."""
     for i in range(values.size):
         values[i] = (1.0 - forget) * values[i] + state[0]
         state[0] = forget * values[i]

@@ -1,4 +1,4 @@
-"""Numbers of several members in one SIMD register, for code shared by single members and vectors of members.
+"""Numbers of several ensemble members in one SIMD register, for code shared by single members and vectors of members.
 
 A function written with `get`, `put` and the arithmetic of this module is compiled twice: to scalar code for arrays of
 one member, and to vector code for arrays with an additional last axis of LANES members. The results of every lane are
@@ -29,7 +29,7 @@ from numba.extending import models, register_model
 from numpy.typing import NDArray
 
 LANES = 4
-"""Members in a vector: as many as an AVX2 register has doubles. Other processors use two registers or half of one."""
+"""Members in a vector: as many as an AVX2 register holds doubles. Other processors use two registers or half of one."""
 
 # `Any`, because these are objects of numba and llvmlite
 FLOAT: Any = types.float64
@@ -126,8 +126,8 @@ def _widened(context: Any, builder: Any, kind: Any, value: Any) -> Any:
 def _arithmetic(
     function: Callable[..., Any], count: int, build: Callable[[Any, bool, list[Any]], Any], own: bool
 ) -> None:
-    """Define type and code of `function` of `count` numbers: a vector if any of them is one, else a float unless numba
-    provides the function (`own` is False).
+    """Define type and code of `function` of `count` numbers. The result is a vector if any of them is one; otherwise it
+    is a float, which is defined here only if `own` is True, because numba provides the other functions of floats.
     """
 
     class Template(AbstractTemplate):

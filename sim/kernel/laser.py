@@ -1,4 +1,4 @@
-"""Free-running laser: it measures between the ticks, and each tick samples its latest output.
+"""Free-running laser: it is not synchronised with the ticks, each of which samples its latest output.
 
 Measurement k is taken at tick (k + phase) / per_tick, a real number, and is output `latency` measurements later.
 """
@@ -12,14 +12,15 @@ from sim.kernel.compiled import compiled
 
 RANGE, GAIN, LINEARITY, WAVES, WAVE_PHASE, STEPS, LOAD, ERROR_CURRENT = range(8)
 """Indices of the constants: measuring range [m], sensitivity relative to nominal [1], linearity error [1], number of
-its periods in the range [1] and their phase [rad], number of steps of the output [1], load [ohm], error current [A].
+periods of this error in the range [1] and their phase [rad], number of steps of the output [1], load [ohm], error
+current [A].
 """
 
 
 @compiled("float64(float64, float64[::1])")
 def output(displacement: float, constants: NDArray[np.float64]) -> float:
     """Voltage [V] across the load at a displacement [m] from mid range: 4 to 20 mA with a reserve of 1 % at both ends,
-    and the error current beyond it.
+    and the error current beyond this range.
     """
     place = displacement / constants[RANGE]
     share = 0.5 + constants[GAIN] * place
@@ -54,7 +55,7 @@ def measure(
     noise : shape (m,), error [m] of each of the m new measurements up to the last tick.
     x, v : shape (n,), position [m] and velocity [m/s] of the target at the ticks, interpolated by cubic Hermite curves.
     last : shape (2,), x and v at the previous tick, updated.
-    taken : shape (latency + 1,), the latest measurements [m], indexed by their number modulo its length, updated.
+    taken : shape (latency + 1,), the latest measurements [m], indexed by their number modulo this length, updated.
     """
     depth, used = taken.size, 0
     for i in range(x.size):

@@ -2,7 +2,7 @@
 
 Every member has its own time, step, contact mode and position in its excitation; the arithmetic of a step is done for
 all lanes at once. Events, and rest under a record, are computed for each member separately. When a member has ended,
-its lane takes the next one.
+its lane takes the next member.
 """
 
 import numpy as np
@@ -57,7 +57,7 @@ value of WAITING is the first member without a lane.
 
 NO_VALUES, NO_PLACES = np.zeros((7, LANES)), np.zeros((6, LANES), np.int64)
 NO_VALUES[SIDE], NO_PLACES[MEMBER] = 1.0, -1
-"""Lanes without members."""
+"""`values` and `places` of lanes without members."""
 
 MEMBERS = (
     "float64[:,::1], int64[::1], float64[:,::1], int64[:,::1], float64[:,::1], int64, float64, float64, float64,"
@@ -130,11 +130,11 @@ def advance_lanes(
     memory: Array,
     numbers: NDArray[np.int64],
 ) -> bool:
-    """Take steps of all lanes until every member has ended, and return False; or until the block of a member rests at
-    the start of a segment of linear acceleration, and return True.
+    """Take steps of all lanes. Returns False when every member has ended, and True when the block of a member rests at
+    the start of a segment of linear acceleration.
 
-    The exact step for such a segment, in the lanes marked in the row ASKS, is that of `sim.kernel.members_at_rest`,
-    which then calls again. Between calls, `memory` and `numbers` keep the state of the lanes, `values` and `places`.
+    The exact step for such a segment, in the lanes marked in the row ASKS, is taken by `sim.kernel.members_at_rest`,
+    which then calls this function again. Between calls, `memory` and `numbers` keep the `values` and `places`.
     """
     count = states.shape[0]
     # allocated here, because the compiler then knows their shapes
@@ -230,7 +230,7 @@ def advance_lanes(
                     row[0, lane] - values[TAU, lane],
                 )
         state_at(c, n, get(values, LENGTH), following)
-        tail(c, n, get(values, LENGTH), values)  # its first row is TAIL
+        tail(c, n, get(values, LENGTH), values)  # written to the first row, TAIL
         if watching > 0:
             bends(c, n, get(values, LENGTH), bounds)
 

@@ -1,7 +1,7 @@
 """Many motions at once under excitations with segments of linear acceleration, such as records.
 
 While a block rests at the start of such a segment, whole segments are taken by the exact step of `sim.kernel.resting`;
-all other steps are those of `sim.kernel.members`. This module is apart, because sines alone do not need it.
+all other steps are those of `sim.kernel.members`. This module is separate, because sines do not need it.
 """
 
 import numpy as np
@@ -47,7 +47,7 @@ def advance_with_rest(
     values: Array,
     places: NDArray[np.int64],
 ) -> None:
-    """Take the exact steps that `advance_lanes` asked for, and call it, until every member has ended."""
+    """Take the exact steps requested by `advance_lanes`, then call it again, until every member has ended."""
     tables, no_samples = np.zeros((LANES, TABLE_ROWS, 6)), np.empty((0, 6))
     a1, c1, after, e = np.zeros(n + 1), np.zeros((6, n + 1)), np.zeros(6), np.zeros(n + 1)
     asking = True
@@ -59,8 +59,8 @@ def advance_with_rest(
                 specimen, table = specimens[specimen_of[j]], tables[lane]
                 length, found = segments[i, 0], MUST_STEP
                 places[ASKS, lane] = 0
-                # a table is worth its cost from the second segment of equal length on; a negative length means that the
-                # table has been computed
+                # the propagator is computed at the second segment of equal length, because its cost would not pay for
+                # a single one; a negative length means that it has been computed
                 if values[MET, lane] == length:
                     values[MET, lane] = -length
                     propagator(specimen, length, n, tolerance, table)

@@ -33,7 +33,7 @@ STATES = 8
 
 
 class Plant(NamedTuple):
-    """Constants of the moving system in SI units; `mass` = 0 and `k_c` = 0 for the bare frame."""
+    """Constants of the moving system in SI units; `mass` is 0 without a block that can rock, `k_c` without a spring."""
 
     m1: float
     m2: float
@@ -67,7 +67,7 @@ class Plant(NamedTuple):
     lag: float
 
 
-# `Any`: the type of PLANT cannot be written as a string, so the signatures here are objects of numba
+# the type of PLANT cannot be written as a string, so the signatures here are numba objects, which are untyped
 FLOAT: Any = types.float64
 INT: Any = types.int64
 VOID: Any = types.void
@@ -88,7 +88,7 @@ def table_force(x: float, v: float, request: float, p: Plant) -> float:
     current = max(current, (-p.voltage_limit - back_emf) / p.resistance)
     current = min(current, (p.voltage_limit - back_emf) / p.resistance)
     current = min(max(current, -p.current_limit), p.current_limit)
-    # tanh from one exponential: twice as fast as the library function, and accurate to the rounding of the friction
+    # tanh from one exponential: twice as fast as the library function, and accurate to rounding
     friction = p.friction * (1.0 - 2.0 / (math.exp(2.0 * v / p.friction_velocity) + 1.0))
     force = p.bl * current - p.k_s * x - p.c_s * v - friction
     over = abs(x) - p.half_stroke
@@ -146,9 +146,9 @@ def overturning_moment(y: Array, dy: Array, p: Plant) -> float:
 def restitution_on_table(p: Plant) -> float:
     """Ratio of the angular velocities after and before an impact on a table that can move.
 
-    Housner's balance of angular momentum about the new corner, including the table's share of the horizontal momentum:
-    (J - mu) omega+ = (r J - mu) omega-, mu = (M h_b)^2 / (m_t + M). r is the ratio on fixed ground, which is the limit
-    for a heavy table. A light table takes up momentum at the impact, which the drive that controls it returns.
+    From Housner's balance of angular momentum about the new corner, with the horizontal momentum shared by the table:
+    (J - mu) omega+ = (r J - mu) omega-, mu = (M h_b)^2 / (m_t + M). The ratio r on fixed ground is the limit for a
+    heavy table. A light table takes up momentum at the impact; the control of its drive restores this momentum later.
     """
     give = (p.mass * p.h_b) ** 2 / (p.moving_mass + p.mass)
     return (p.restitution * p.inertia - give) / (p.inertia - give)
@@ -158,8 +158,8 @@ def restitution_on_table(p: Plant) -> float:
 def turn(y: Array, omega: float, p: Plant) -> None:
     """Change the block's angular velocity to `omega` instantaneously; the table takes the horizontal impulse.
 
-    m_t v + M (v - G omega) is conserved. The columns transmit no impulse, so that the storeys keep their absolute
-    velocities.
+    m_t v + M (v - G omega) is conserved, with the lever G of the module's docstring. The columns transmit no impulse,
+    so that the storeys keep their absolute velocities.
     """
     lever = p.h_b * math.cos(y[6]) + math.copysign(p.b, y[6]) * math.sin(y[6])
     jump = p.mass * lever * (omega - y[7]) / (p.moving_mass + p.mass)

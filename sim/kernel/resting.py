@@ -1,4 +1,4 @@
-"""Exact integration step of the frame while the block rests, with proof that no event lies within the step.
+"""Exact integration step of the frame while the block rests, with a proof that no event occurs within the step.
 
 At rest everything is linear. With y = [u1, u2, v1, v2, a_g, a_g'] and a linear base acceleration,
 y' = A y, so a step of length h is y(h) = exp(A h) y(0): [Phi | Gamma0 | Gamma1] are the first four rows (Van Loan,
@@ -16,11 +16,11 @@ from sim.kernel.compiled import compiled
 from sim.kernel.packing import C1, C2, COUPLED, GRAVITY, H1, H_B, K1, K2, K_C, M1, M2, MASS, B
 
 TABLE_ROWS = 9
-"""Rows of a propagator: u1, u2, v1, v2, then the bounds of the moment, u1, the drift, and the velocities of both."""
+"""Rows of a propagator: u1, u2, v1, v2, then bounds of the moment, u1, the drift, and the rates of u1 and drift."""
 
 MUST_STEP, GLIDED, LOOK_INSIDE, ANOTHER_KIND = range(4)
 """Results of `glide`: the block may lift in the segment; all segments are taken; the block does not lift, but a peak
-may lie inside the segment; the segment is a sine or has another length.
+may be inside the segment; the segment is a sine or has another length.
 """
 
 
@@ -29,7 +29,7 @@ def propagator(p: NDArray[np.float64], h: float, n: int, tolerance: float, table
     """Write the exact step of length `h` [s] and its bounds to `table`, shape (TABLE_ROWS, 6).
 
     The first element, which is otherwise positive, is 0 if the table cannot be used, because a Taylor polynomial of
-    order `n`, needed to look inside the step, does not reach `tolerance`.
+    order `n`, needed for the peaks within the step, does not reach `tolerance`.
     """
     # plain loops: array expressions would add seconds of compilation
     system = np.zeros((2, 6, 6))
@@ -105,7 +105,7 @@ def glide(
     """Apply the exact step of `table` to segment `i` and the following ones, until one needs closer inspection.
 
     Returns the index of that segment, which is not taken, and the reason. `x`, shape (6,), is then the state at its
-    start, and `following` the exact state at its end. The number of segments and GLIDED mean that all were taken.
+    start, and `following` the exact state at its end. If all segments were taken, returns their number and GLIDED.
     until : time [s] of the next sample; the segment that contains it is not taken, because the caller takes the sample.
     peaks : peaks of |u1| and |u2 - u1| from `peaks_from` [s] on, raised if the ends of a segment suffice because the
     motion between them is proved to be monotone.

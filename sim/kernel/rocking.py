@@ -5,7 +5,7 @@ polynomials, so that they are as accurate as the step. In a phase that starts at
 out: the return to zero is found however short the phase, and a chattering block cannot pass through the ground.
 
 While the block rests under a record, whole segments are taken by the exact step of `sim.kernel.resting`; a Taylor
-polynomial is computed only where the block may lift or a requested value may lie inside the segment. Requests for peaks
+polynomial is computed only where the block may lift or a requested value may be inside the segment. Requests for peaks
 and samples do not affect the motion: they are evaluated on unchanged steps.
 """
 
@@ -56,7 +56,7 @@ MEMORY_ROWS = 1 + TABLE_ROWS
 """Rows of `advance`'s memory: one row of scalars, then the propagator of the frame while the block rests."""
 
 AT_ONCE = 1e-12
-"""Times [s] that are closer than this count as the same instant."""
+"""Difference [s] below which two times count as the same instant."""
 
 
 @compiled("float64(float64, float64, float64[::1], int64, int64, int64, int64)")
@@ -120,8 +120,8 @@ def advance(
         row = segments[i]
         found = MUST_STEP
         if sg == 0.0 and row[1] == 0.0 and row[2] == 0.0 and row[3] == 0.0 and row[4] == 0.0:
-            # a table is worth its cost from the second segment of equal length on; a negative length means that the
-            # table has been computed
+            # the propagator is computed at the second segment of equal length, because its cost would not pay for a
+            # single one; a negative length means that it has been computed
             if kept[LENGTH] == row[0]:
                 kept[LENGTH] = -row[0]
                 propagator(p, row[0], n, tolerance, table)
@@ -261,7 +261,7 @@ def run(
     order, tolerance : of the Taylor steps; the last two terms stay below the fraction `tolerance` of the velocities.
     longest_step : [s]; with an infinite tolerance, every step has this length or ends at an event or a segment.
     theta_limit : |theta| [rad] that counts as overturning.  rest_angle : [rad], see below.  peaks_from : [s].
-    impact_limit : number of impacts right after which the run ends.
+    impact_limit : the run ends right after this number of impacts.
     report : shape (8,), written: status, end time, impacts, steps, samples, peaks of |u1|, |u2 - u1|, |theta|.
 
     At rest, the moment on the block is m = h_b M a_g - k_C h1 u1. The block lifts when |m| > b g M, and rocks about A

@@ -77,8 +77,8 @@ def first_root(p: NDArray[np.float64], n: int, h: float) -> float:
         if not inside:
             trial = 0.5 * (left + right)
         moved, t = abs(trial - t), trial
-        # the next Newton step would be of the order of the bend times this step squared; the next Halley step is far
-        # smaller
+        # the next Newton step would be of the order of the curvature times this step squared; the next Halley step is
+        # far smaller
         if moved <= 4e-16 * t:
             break
         if inside and moved <= 1e-6 * t and abs(half_bend) * moved * moved <= 1e-13 * t * -slope:

@@ -21,7 +21,7 @@ SHORTEST_STEP = 1e-9
 """Step [s] below which the tolerance counts as unattainable, so that the run fails."""
 
 LARGEST_STATE = 1e6
-"""Bound of every component of a physical state. A run fails if its state exceeds it or becomes NaN."""
+"""Bound on the magnitude of every component of a state. A run fails if its state exceeds it or becomes NaN."""
 
 
 @compiled("float64(float64[::1], float64, float64, float64, float64, float64, int64, float64, float64)")

@@ -44,7 +44,7 @@ _BOUNCES = 100
 far fewer.
 """
 _INSTANT = 1.0e-14
-"""Accuracy to which the instant of an event is found [s]."""
+"""Accuracy of the instant of an event [s]."""
 
 
 @compiled(VOID(INT, ROW, FLOAT, FLOAT, FLOAT, FLOAT, PLANT, GRID))
@@ -73,7 +73,7 @@ def advance(mode: int, y: Array, h: float, held: float, request: float, noise: f
 
 @compiled(FLOAT(INT, INT, ROW, FLOAT, FLOAT, PLANT, GRID))
 def margin(event: int, mode: int, y: Array, request: float, noise: float, p: Plant, work: Array) -> float:
-    """Distance of the state `y` from `event`: positive before it, negative past it."""
+    """Margin of the state `y` to `event` [rad, or N m for the uplift]: positive before the event, negative past it."""
     if event == _IMPACT:
         return y[6] if mode == ROCK_A else -y[6]
     if event == _CATCH:
@@ -146,7 +146,7 @@ def impact(mode: int, y: Array, request: float, noise: float, p: Plant, work: Ar
 
 @compiled(INT(INT, ROW, FLOAT, FLOAT, PLANT, GRID))
 def passed(mode: int, y: Array, request: float, noise: float, p: Plant, work: Array) -> int:
-    """Event passed by a step that ends in the state `y`."""
+    """Event passed by a step that ends in the state `y`; _NONE if no event is passed."""
     if mode == REST:
         return _UPLIFT if p.mass > 0.0 and margin(_UPLIFT, mode, y, request, noise, p, work) < 0.0 else _NONE
     if mode == FALLEN:

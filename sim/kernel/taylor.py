@@ -131,7 +131,7 @@ def rocking_coefficients(
         if k > 0:
             s = cs = pushed = square = arm = lengths = e = g = nothing
             if elastic:
-                # one loop for all sums: in a loop of its own, each addition would wait for the previous one
+                # one loop for all sums: with a loop for each sum, each addition would wait for the previous one
                 for j in range(1, k):
                     omega, u, length = get2(c, 5, j), get2(c, 0, j), get2(w, 4, j)
                     s = fma(omega, get2(w, 1, k - 1 - j), s)

@@ -72,8 +72,7 @@ def raise_peaks(
     e: NDArray[np.float64],
     report: NDArray[np.float64],
 ) -> None:
-    """Raise the peaks |u1|, |u2 - u1|, |theta| in the `report` of a run to the greatest values in [start, h] if these
-    are greater.
+    """Update the peaks |u1|, |u2 - u1| and, if `rocking`, |theta| in the `report` of a run for the interval [start, h].
 
     following : the state at `h`, shape (6,).
     """
@@ -122,8 +121,8 @@ def is_clear(
 ) -> bool:
     """Whether a bound proves that a step of a rocking block contains no event.
 
-    The bound follows from the first coefficients of theta and, as `rest`, the `tail` of the others. After division by
-    the known roots, the first three coefficients are a parabola, whose minimum is exact.
+    The bound follows from the first five coefficients of theta and from `rest`, the `tail` of the others. After
+    division by the known roots, the first three coefficients are a parabola, whose minimum is exact.
     """
     if known == 0:
         first, line, bend, rest = theta_0, theta_1, theta_2, fma(fma(rest, h, abs(theta_4)), h, abs(theta_3))

@@ -118,7 +118,9 @@ def test_a_spring_of_any_stiffness_is_called_what_it_amounts_to() -> None:
 
 
 def test_a_specimen_that_cannot_be_is_refused_with_its_reason() -> None:
-    with pytest.raises(InvalidInput, match=r"no such specimen exists: .*an impact can neither increase"):
+    with pytest.raises(
+        InvalidInput, match=r"these values do not form a valid specimen: .*an impact can neither increase"
+    ):
         Identified(findings=(found("restitution_factor", 1.2, 0.1),)).applied(Specimen())
     with pytest.raises(ValidationError, match="label"):
         Specimen(springs=(Spring(label=0.5, k_c=99.0), Spring(label=0.5, k_c=98.0)))

@@ -126,7 +126,7 @@ def test_a_file_that_cannot_be_used_is_found_by_the_check_of_a_configuration(kep
     kept.write_text(kept.read_text(encoding="utf-8").replace("0.992", "1.2"), encoding="utf-8")
     bench.write_text('specimen_file = "specimen.json"\n', encoding="utf-8")
     (problem,) = problems_of(bench)
-    assert "no such specimen exists" in str(problem)
+    assert "these values do not form a valid specimen" in str(problem)
 
 
 def test_findings_may_stand_in_the_configuration_and_are_judged_there(tmp_path: Path) -> None:

@@ -150,4 +150,4 @@ def test_the_orbit_about_which_a_motion_turns_is_compared_with_the_prediction(of
     assert point.alpha_2_least is not None
     assert point.alpha_2_least < point.alpha_2_orbit or off == 0.0
     assert (point.multiplier, point.multiplier_uncertainty) == (0.999, 0.002)
-    assert "its mean cycle gives the gain of the orbit" in point.reason
+    assert "the mean cycle gives the gain of the orbit" in point.reason

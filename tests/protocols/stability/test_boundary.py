@@ -137,5 +137,5 @@ def test_a_design_exists_for_stable_orbits_too() -> None:
 
 
 def test_a_second_pair_of_nearly_equal_modulus_is_remarked() -> None:
-    assert "second pair of modulus 0.9736 at 148.8 degrees" in close_pair(orbit(15.6, 0.97))
+    assert "second pair of multipliers, modulus 0.9736 at 148.8 degrees" in close_pair(orbit(15.6, 0.97))
     assert close_pair(orbit(15.0, 0.97)) == ""
