@@ -30,7 +30,7 @@ from bench.engine.steps import (
 )
 from bench.events import LimitExceeded, State, Warned
 from bench.guard.guard import Exchange, Guard
-from bench.guard.limits import Violation
+from bench.guard.limits import Violation, amount
 from bench.plugins import plugin_code
 from drivers.rig import Alignment, Counts, Rig
 from sim.errors import UNKNOWN, Cause, CauseCode, InvalidInput, RockbenchError
@@ -63,7 +63,7 @@ class Loop:
         exchange = self.output.exchange()
         for near in exchange.warnings:
             self._stream.publish(
-                Warned(f"{near.quantity} {near.value:.4g} {near.unit} approaches its limit {near.limit:.4g}")
+                Warned(f"{near.quantity} {amount(near.value, near.unit)} approaches its limit {near.limit:.4g}")
             )
         self._runaway = exchange.runaway
         if exchange.violation is not None and exchange.violation.cuts:

@@ -148,7 +148,12 @@ class Violation:
     cuts: bool = False
 
     def __str__(self) -> str:
-        return f"{self.quantity} {self.value:.4g} {self.unit} exceeds {self.limit:.4g} {self.unit}"
+        return f"{self.quantity} {amount(self.value, self.unit)} exceeds {amount(self.limit, self.unit)}"
+
+
+def amount(value: float, unit: str) -> str:
+    """A value with its unit; a ratio, whose unit is 1, stands alone."""
+    return f"{value:.4g}" if unit == "1" else f"{value:.4g} {unit}"
 
 
 class Persistence:

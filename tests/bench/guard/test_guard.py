@@ -293,6 +293,8 @@ def test_the_specimen_is_watched(channel: str, reading: float, quantity: str) ->
     found = _until_violation(_bench_rig(**{channel: lambda v: reading * v / 4.0}), limits, 4.0).violation
     assert found is not None
     assert found.quantity == quantity
+    # a ratio is stated without a unit
+    assert str(found).endswith(" 0.99" if channel == "laser_1" else " 0.08 m")
 
 
 def test_a_warning_comes_once_and_before_the_end() -> None:
