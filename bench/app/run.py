@@ -40,6 +40,7 @@ def run(
     """Run a protocol and return its campaign, whose `status` states how it ended.
 
     parameters, more : parameters of the protocol, as a mapping and as keyword arguments.
+    configuration : configuration of the bench or its file; by default, a simulated bench.
     specimen : specimen file (.json).
     seed, realtime : seed of a simulated bench, and whether it runs in real instead of virtual time.
     out : folder for the results, by default runs/<protocol>-<date>T<time>.

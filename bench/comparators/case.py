@@ -1,7 +1,7 @@
-"""The standard case: 120 s of steady rocking with 649 impacts, and its independently known values.
+"""The standard case: 120 s of steady rocking with 649 impacts, with independent reference values.
 
-START and PHASE are the periodic orbit at beta 0.64, Omega 17 rad/s to ten digits: they define the case and are taken as
-exact. END and PEAKS are its solution by heyoka in 80-bit arithmetic at tolerance 1e-19, with an integrator and
+START and PHASE give the periodic orbit at beta 0.64, Omega 17 rad/s to ten digits: they define the case and are taken
+as exact. END and PEAKS are its solution by heyoka in 80-bit arithmetic at tolerance 1e-19, with an integrator and
 equations that are independent of this program; `tests/benchmarks/reference.py` recomputes them and checks the beginning
 of the motion with mpmath at 30 digits.
 """
@@ -43,7 +43,7 @@ def drive(duration: float = DURATION) -> SineProgram:
 
 
 def error_of(end: NDArray[np.float64]) -> float:
-    """Largest deviation of an end state, shape (6,), from END, in SI units; velocities are of the order of 1 m/s."""
+    """Largest absolute deviation of an end state, shape (6,), from END; all components are in SI units."""
     return float(np.abs(end - END).max())
 
 

@@ -18,7 +18,7 @@ RIGS = "rockbench.rigs"
 
 
 class RigSettings(Parameters):
-    """Table `[rig]` of a configuration: the bench behind a backend of another package.
+    """Table `[rig]` of a configuration: settings of a bench whose backend belongs to another package.
 
     A backend derives its settings class from this one, adds its own keys and may change defaults.
     """
@@ -28,7 +28,7 @@ class RigSettings(Parameters):
     acceleration_range: float | None = quantity(
         None,
         "m/s2",
-        "range of the accelerometer; if absent, it is not compared with limits",
+        "measuring range of the accelerometer; if absent, no limit is checked against it",
         gt=0,
         example=100.0,
     )
