@@ -40,7 +40,7 @@ class KeptFile:
 
     def read(self, path: Path) -> dict[str, Any]:
         """Contents of a file without its header. Raises InvalidInput if the file cannot be read, or if its format or
-        version differs.
+        version is not the expected one.
         """
         try:
             data: Any = json.loads(read_bounded(path).decode("utf-8-sig"))
@@ -83,7 +83,7 @@ def read_specimen(path: Path) -> Identified:
 
 
 def _content(path: Path, content: dict[str, Any]) -> dict[str, Any]:
-    """Findings and correlations, with the units checked and removed."""
+    """Findings and correlations of a specimen file, with the units checked and removed."""
     unknown = set(content) - {"findings", "correlations"}
     if unknown:
         raise InvalidInput(f"{path.name}: {min(unknown)}", content[min(unknown)], "there is no such key")

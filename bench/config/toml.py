@@ -1,8 +1,8 @@
-"""Configuration files: TOML in SI units, fully validated before anything starts; and their templates.
+"""Configuration files: TOML in SI units, fully validated before anything starts.
 
-A template has every key, the essential keys, or the keys of a bench with NI and optoNCDT devices. Templates are
-generated from the declarations, so that keys, units, limits and defaults are those of the program. Every commented-out
-line is complete: removing its # sets the key.
+A template, written by `bench.config.template`, has every key, the essential keys, or the keys of a bench with NI and
+optoNCDT devices. Templates are generated from the declarations, so that keys, units, limits and defaults are those of
+the program. Every commented-out line is complete: removing its # sets the key.
 """
 
 import re
@@ -55,7 +55,7 @@ def read_table(path: Path, item: str) -> dict[str, Any]:
 
 
 def _hint(text: str, error: str) -> str:
-    """Hint for an invalid line: the correction if it has a decimal comma."""
+    """Hint for an error in a line: the line, and its correction if it contains a decimal comma."""
     line = re.search(r"at line (\d+)", error)
     lines = text.splitlines()
     if line is None or not 0 < int(line[1]) <= len(lines):
@@ -77,7 +77,7 @@ def read_configuration(path: str | PathLike[str]) -> BenchConfiguration:
 
 
 def former_keys(path: str | PathLike[str]) -> tuple[str, ...]:
-    """A notice for each key of a configuration file that still has the name used by an earlier version."""
+    """A notice for each key of a configuration file that has the name used by an earlier version."""
     file = Path(path)
     found = former_names(BenchConfiguration, read_table(file, "configuration file"))
     return tuple(f"{_within(file)(old)} is now called {new}; rename it" for old, new in found)

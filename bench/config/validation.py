@@ -226,7 +226,7 @@ def _suggestion(model: type[Parameters], path: Path) -> str:
         return f"; the nearest is {dotted((*parent, close[0]))}"
     everywhere = list(keys(model))
     elsewhere = [key for key in everywhere if key.rpartition(".")[2] == name] or get_close_matches(
-        # all paths of a group are similar
+        # a high cutoff, because all paths of a group are similar
         dotted(path),
         everywhere,
         n=1,

@@ -17,7 +17,7 @@ from bench.control.target import Reach
 from sim.errors import InvalidInput
 
 INFEASIBLE = 1e-10
-"""Residual of the dual least-squares problem below which no vector satisfies the inequalities."""
+"""Residual of the dual least-squares problem below which the inequalities are treated as infeasible."""
 
 
 class Infeasible(Exception):
@@ -39,7 +39,7 @@ def shortest(equations: tuple[Array, Array], inequalities: tuple[Array, Array]) 
     free, needed = g - (g @ inverse) @ a, h - g @ particular
     if not (needed > 0.0).any():
         return particular
-    # scaled by the distance to the farthest inequality
+    # the scale is the distance to the farthest inequality
     scale = float((needed / np.linalg.norm(free, axis=1)).max())
     dual = np.vstack((scale * free.T, needed))
     target = np.zeros(dual.shape[0])
@@ -54,7 +54,8 @@ def shortest(equations: tuple[Array, Array], inequalities: tuple[Array, Array]) 
 
 
 class SineModes:
-    """sin(k pi j / (n - 1)) at the samples j = 0 to n - 1, for every k whose frequency is `lowest` to `highest` [Hz].
+    """sin(k pi j / (n - 1)) at the samples j = 0 to n - 1, for every k with a frequency from `lowest` to `highest`
+    [Hz].
 
     There are at least two modes. They vanish at both ends of the record.
     """
@@ -97,7 +98,7 @@ class SineModes:
 
 
 def _transformed(values: Array) -> Array:
-    """Twice the type I discrete sine transform, shape (n,)."""
+    """Type I discrete sine transform in scipy's definition, with a factor of 2; shape (n,)."""
     from scipy.fft import dst
 
     return np.asarray(dst(values, type=1), dtype=np.float64)
@@ -149,7 +150,7 @@ suffice.
 """
 
 CHEAP = 0.5
-"""Frequency [Hz] at which the weight of the squared change is 1; elsewhere it is (f / CHEAP)^4."""
+"""Frequency [Hz] at which the squared change has the weight 1; at a frequency f the weight is (f / CHEAP)^4."""
 
 FLOOR = 0.05
 """Frequency [Hz] below which the weight is constant, since a slower sine would use up the stroke at once."""

@@ -76,7 +76,7 @@ class RunRecord:
 
     @property
     def panel(self) -> Panel | None:
-        """The first panel of the live view with measured lines; None if there is none, and for a protocol with gains."""
+        """The first panel of the live view with measured lines; None if there is none or the protocol has gains."""
         protocol = self.contents.protocol
         if protocol is None or self.live is None or self.contents.has_gain:
             return None
