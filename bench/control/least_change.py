@@ -153,7 +153,7 @@ CHEAP = 0.5
 """Frequency [Hz] at which the squared change has the weight 1; at a frequency f the weight is (f / CHEAP)^4."""
 
 FLOOR = 0.05
-"""Frequency [Hz] below which the weight is constant, since a slower sine would use up the stroke at once."""
+"""Frequency [Hz] below which the weight is constant; cheaper slow sines would use up the stroke at once."""
 
 SPECTRUM = 7.0
 """Duration [s] for which a change as large as the record's peak has the same cost as doubling every oscillator's
@@ -169,7 +169,7 @@ CLOSER = 1e-4
 """Fraction of a limit that the solution reserves for rounding and for the samples between peaks."""
 
 MOST_ROUNDS = 60
-"""Largest number of rounds in which samples are added; a dozen is usual."""
+"""Maximum number of rounds in which samples are added; a dozen is usual."""
 
 
 class _Bound(NamedTuple):
@@ -219,7 +219,7 @@ class _Problem:
         self._bounds: list[_Bound] = []
 
     def solved(self, peaks: list[Peak], scales: Array) -> Array:
-        """The record with the least-cost change; changes of the peaks are weighted relative to their scales [m/s2]."""
+        """The record with the least-cost change; changes of the peaks are relative to `scales` [m/s2]."""
         from scipy.linalg import cholesky, solve_triangular
 
         pulls = np.array([self._modes.products(peak.weights) for peak in peaks]) / scales[:, None]
@@ -252,8 +252,8 @@ class _Problem:
         raise self._refusal("the search ended before a change kept the record")
 
     def _equations(self) -> tuple[Array, Array]:
-        """A and b of the equations A sizes = b, with which the table's velocity and displacement are zero at the
-        record's end.
+        """A and b of the equations A sizes = b, which make the table's velocity and displacement zero at the end of the
+        record.
         """
         scale = np.array([self._reach.velocity, self._reach.displacement])
         velocity, displacement = self._modes.motions(np.array([self._record.size - 1]))
@@ -288,4 +288,4 @@ class _Problem:
     def _refusal(self, why: str) -> InvalidInput:
         allowed = f"{1e3 * self._reach.displacement:.3g} mm and {self._reach.velocity:.3g} m/s"
         peak = f"peak displacement {1e3 * self._motion.peak_displacement:.3g} mm"
-        return InvalidInput("record", peak, f"{why} within {allowed}: scale its time or its acceleration down")
+        return InvalidInput("record", peak, f"{why} within {allowed}: reduce its time scale or its acceleration")

@@ -130,7 +130,7 @@ class SpectrumCheck:
         self._target_spectrum = self._spectrum(target)
 
     def error(self, achieved: Array) -> float:
-        """Largest relative deviation of the response spectrum."""
+        """Largest relative deviation of the response spectrum of `achieved` from that of the target."""
         return float(np.abs(self._spectrum(achieved) / self._target_spectrum - 1.0).max())
 
     def clear_error(self, achieved: Array, frequency: Array, noise: Array) -> tuple[float, float]:
