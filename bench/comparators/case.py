@@ -38,7 +38,7 @@ PEAKS = (0.00082052486744979255383, 0.0060632412081126333043, 0.0336116212243269
 
 
 def drive(duration: float = DURATION) -> SineProgram:
-    """The base excitation."""
+    """The base excitation over `duration` [s]."""
     return SineProgram([Sweep.dwell(duration, AMPLITUDE, OMEGA)], phase=PHASE)
 
 

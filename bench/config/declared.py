@@ -64,7 +64,7 @@ class Declared:
 
     @property
     def choices(self) -> tuple[str, ...]:
-        """The allowed words, or () when the value is not a choice."""
+        """The allowed words, or () if the value is not a choice."""
         if get_origin(self.kind) is Literal:
             return tuple(str(choice) for choice in get_args(self.kind))
         if isinstance(self.kind, type) and issubclass(self.kind, Enum):

@@ -101,7 +101,7 @@ class BenchConfiguration(Parameters):
 
     @property
     def sensors(self) -> SensorUncertainty:
-        """Uncertainty of the sensors."""
+        """Uncertainty of the sensors, from the table `analysis`, the lasers' ranges and their calibration."""
         return SensorUncertainty(self.analysis, self.laser_ranges, self.calibrated)
 
     @property

@@ -69,7 +69,7 @@ class _Reach:
 
 
 def review(configuration: BenchConfiguration) -> Review:
-    """Review of a configuration without a protocol."""
+    """Review of a configuration, independent of any protocol."""
     confirmed, refusals, notices = configuration.limits.confirmed, list[InvalidInput](), list[str]()
     for reach in _reaches(configuration):
         value = float(getattr(configuration.limits, reach.limit))

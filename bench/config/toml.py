@@ -118,7 +118,7 @@ def _with_specimen_file(configuration: BenchConfiguration, path: Path) -> BenchC
 
 
 def _with_calibration_file(configuration: BenchConfiguration, path: Path) -> BenchConfiguration:
-    """Replace the name of the calibration file, relative to the same folder, by its contents.
+    """Replace the name of the calibration file, relative to the folder of `path`, by its contents.
 
     Raises InvalidInput if it cannot be read.
     """
@@ -129,7 +129,7 @@ def _with_calibration_file(configuration: BenchConfiguration, path: Path) -> Ben
 
 
 def _with_certificates(configuration: BenchConfiguration, path: Path) -> BenchConfiguration:
-    """Replace the names of the connection's PEM files, relative to the same folder, by their paths."""
+    """Replace the names of the TLS connection's PEM files, relative to the folder of `path`, by absolute paths."""
     tls = configuration.hardware.daq.tls
     if tls is None:
         return configuration

@@ -42,7 +42,7 @@ def unusual(parameters: Parameters, prefix: str = "") -> Iterator[str]:
             item, value = outside[0]
             unit = "" if watched.unit == "1" else f" {watched.unit}"
             said = f"{item} = {value:g}{unit}{_in_hertz(value, watched.unit)}{_others(outside)}"
-            yield f"{said} is {'below' if abs(value) < low else 'above'} the usual {low:.3g} to {high:.3g}{unit}"
+            yield f"{said} is {'below' if abs(value) < low else 'above'} the usual range, {low:.3g} to {high:.3g}{unit}"
     for name in groups:
         group = getattr(parameters, name)
         if isinstance(group, Parameters):
@@ -71,7 +71,7 @@ def off_resonance(parameters: Parameters, modes: tuple[float, float]) -> Iterato
 
 
 def in_hertz(parameters: Parameters) -> Iterator[str]:
-    """A line for each circular frequency or list of frequencies, in both units."""
+    """A line for each circular frequency or list of frequencies, in rad/s and Hz."""
     for watched in _watched(type(parameters))[0]:
         values = [value for _, value in _numbers("", getattr(parameters, watched.name))]
         if watched.unit == ANGULAR and values:

@@ -205,7 +205,7 @@ def fit_by_least_change(
 
 
 class _Problem:
-    """The problem for one record and its limits; constrained samples remain constrained in later solutions."""
+    """Least-change problem of one record and its limits; constrained samples remain constrained in later solutions."""
 
     def __init__(self, acceleration: Array, dt: float, reach: Reach, lowest: float) -> None:
         self._record, self._dt, self._reach = acceleration, dt, reach

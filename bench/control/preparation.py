@@ -67,10 +67,10 @@ class PreparedMotion:
     """A motion of the table with its derivation from a record.
 
     `record` begins at `begin` [s] on the original record's clock; before that time the table is at rest. All
-    accelerations were multiplied by `factor`. `peak_before` and `peak` are the largest accelerations [m/s2] of the
-    original record and of the motion; `motion` has the table's velocity and displacement. `band` [Hz] is None if the
-    record was not filtered, `reach` and `fit` are None if no stroke was given; `steps` describes the processing steps
-    in order.
+    accelerations were multiplied by `factor`. `peak_before` and `peak` are the largest magnitudes of acceleration
+    [m/s2] of the original record and of the motion; `motion` has the table's velocity and displacement. `band` [Hz] is
+    None if the record was not filtered, `reach` and `fit` are None if no stroke was given; `steps` describes the
+    processing steps in order.
     """
 
     record: SampledRecord

@@ -171,7 +171,7 @@ class Integrity:
         if self.failing:
             return "damaged or changed since it was written: " + "; ".join(self.failing.values())
         left = f"; {len(self.unchecked)} not checked" if self.unchecked else ""
-        return f"{self.compared} datasets are unchanged{left}"
+        return f"unchanged datasets: {self.compared}{left}"
 
 
 def integrity(entry: hdf5.Group, largest: int | None = SMALL, done: Done = lambda _done, _all: None) -> Integrity:

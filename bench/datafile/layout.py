@@ -35,7 +35,7 @@ STATUS_WIDTH, TIME_WIDTH, SUMMARY_WIDTH = 16, 40, 4096
 
 
 class Status(StrEnum):
-    """Status of the campaign."""
+    """Status of a campaign in its file; a recovery sets "interrupted"."""
 
     RUNNING = "running"
     COMPLETED = "completed"

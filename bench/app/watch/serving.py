@@ -19,7 +19,7 @@ LAST = 0.5
 
 
 class LivePage:
-    """The page, served at `url` from its creation.
+    """The live page, served at `url` from its creation.
 
     address, port : interface and port to listen on; port 0 is any free one.
     process : identifier of the only process whose session is shown; None for any.

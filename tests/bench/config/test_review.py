@@ -131,9 +131,9 @@ def test_what_physics_decides_is_refused(text: str, item: str) -> None:
         (lambda: BenchConfiguration(limits=Limits(stuck=50.0)), r"limits\.stuck = 50 s is above the usual"),
         (
             lambda: BenchConfiguration(limits=Limits(debounce=Debounce(drift=0.5))),
-            r"limits\.debounce\.drift = 0\.5 s is above the usual 0\.001 to 0\.05 s",
+            r"limits\.debounce\.drift = 0\.5 s is above the usual range, 0\.001 to 0\.05 s",
         ),
-        (lambda: _specimen(xi1=0.35), r"specimen\.frame\.xi1 = 0\.35 is above the usual 0\.001 to 0\.15"),
+        (lambda: _specimen(xi1=0.35), r"specimen\.frame\.xi1 = 0\.35 is above the usual range, 0\.001 to 0\.15"),
         (lambda: _specimen(k1=0.21344, k2=0.05645), r"specimen\.frame\.k1 = 0\.21344 N/m is below the usual"),
         (
             lambda: _specimen(xi1=0.02, xi2=0.01),
@@ -172,4 +172,4 @@ def test_a_plan_states_its_frequencies_in_hertz_beside_the_modes() -> None:
 
 def test_a_prediction_warns_and_goes_on(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["predict", "modes", "--beta", "25", "--json"]) == 0
-    assert "warning: beta[0] = 25 is above the usual 0.02 to 5" in capsys.readouterr().err
+    assert "warning: beta[0] = 25 is above the usual range, 0.02 to 5" in capsys.readouterr().err
