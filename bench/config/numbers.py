@@ -177,7 +177,8 @@ def require_units_alike(items: Sequence[str]) -> None:
 
 def read_band(text: str, unit: str = "Hz") -> tuple[float, float]:
     """Two ascending positive numbers LOW:HIGH in `unit`, with an optional unit at the end. Raises ValueError for
-    any other text."""
+    any other text.
+    """
     low, colon, high = text.partition(":")
     digits, typed = _parted(high.strip())
     for part in (low, digits):

@@ -262,7 +262,10 @@ def _findings(configuration: BenchConfiguration) -> Iterator[str]:
         item = f"identified.findings[{place}] ({finding.name})"
         relative = finding.standard_uncertainty / finding.value if finding.value else 0.0
         if relative and not 2e-5 <= relative <= 0.5:
-            yield f"{item}: standard_uncertainty = {finding.standard_uncertainty:g} is {relative:.2g} times the value"
+            yield (
+                f"{item}: standard_uncertainty = {finding.standard_uncertainty:g} is {relative:.2g} times the value; "
+                "usual values: 2e-5 to 0.5 times"
+            )
         assumed = _assumed(configuration.specimen, finding.name)
         if assumed and finding.value and not 0.2 <= finding.value / assumed <= 5.0:
             ratio = finding.value / assumed

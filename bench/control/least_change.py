@@ -153,7 +153,7 @@ CHEAP = 0.5
 """Frequency [Hz] at which the squared change has the weight 1; at a frequency f the weight is (f / CHEAP)^4."""
 
 FLOOR = 0.05
-"""Frequency [Hz] below which the weight is constant; cheaper slow sines would use up the stroke at once."""
+"""Frequency [Hz] below which the weight is constant; with a smaller weight, slower sines would use up the stroke."""
 
 SPECTRUM = 7.0
 """Duration [s] for which a change as large as the record's peak has the same cost as doubling every oscillator's

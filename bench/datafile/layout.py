@@ -35,7 +35,7 @@ STATUS_WIDTH, TIME_WIDTH, SUMMARY_WIDTH = 16, 40, 4096
 
 
 class Status(StrEnum):
-    """Status of a campaign in its file; a recovery sets "interrupted"."""
+    """Status of a campaign in its file; only a recovery sets "interrupted"."""
 
     RUNNING = "running"
     COMPLETED = "completed"

@@ -71,7 +71,7 @@ def gains_picture(curves: Sequence[SeismicCurve], words: str) -> Picture:
 
 
 def motions_table(curves: Sequence[SeismicCurve]) -> Table:
-    """Table of the shake table's peak motion, the range of alpha_2 and the fraction of toppling blocks, by record."""
+    """Table of table motion, range of alpha_2 and share of stiffness ratios at which the block topples, by record."""
     columns = [
         Column("record", words=True),
         Column("band", "Hz", words=True),
