@@ -112,7 +112,7 @@ class _Person:
         self.name = "the bench itself" if answer is None else "operator of the script"
 
     def confirm(self, request: str) -> bool:
-        """Return the answer; Ctrl-C during the wait counts as a refusal."""
+        """Whether the task of `request` is done; Ctrl-C during the wait counts as a refusal."""
         if self._answer is None:
             return True
         self.asking = True

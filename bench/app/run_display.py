@@ -17,7 +17,7 @@ NOTICES = 5
 
 @dataclass(frozen=True)
 class Notice:
-    """A line of the log; `kind` is one word, and `grave` is True for a line that needs the operator's attention."""
+    """A line of the log, with bench `time` [s]; `grave` is True for a line that needs the operator's attention."""
 
     time: float
     kind: str
@@ -91,7 +91,7 @@ class Row:
 
     @property
     def where(self) -> str:
-        """The frequency with its unit, or the record."""
+        """The circular frequency with its unit, or the name of the earthquake record."""
         return self.omega if self.under_record else f"omega {self.omega} rad/s"
 
     @property

@@ -31,7 +31,7 @@ END: NDArray[np.float64] = np.array(
         -0.23633857278366831926,
     ]
 )
-"""State after DURATION, in the form of `State.as_array`."""
+"""State after DURATION: u1, u2 [m], their velocities [m/s], theta [rad] and its velocity [rad/s]."""
 
 PEAKS = (0.00082052486744979255383, 0.0060632412081126333043, 0.033611621224326909147)
 """Largest |u1|, |u2 - u1| [m] and |theta| [rad] of the whole run."""

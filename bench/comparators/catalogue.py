@@ -112,8 +112,8 @@ SOLVERS: Mapping[str, Solver] = MappingProxyType(
                 None,
             ),
             Solver("paper", "RK4 with a sign test, as in the paper", "step", PAPER_STEP, (1e-6, 0.1), paper),
-            Solver("rk4-located", "RK4 with events located by stepping", "step", PAPER_STEP, (1e-6, 0.1), rk4_located),
-            Solver("dop853", "scipy's DOP853 with its events", "tolerance", TOLERANCE, (1e-13, 1e-3), dop853),
+            Solver("rk4-located", "RK4, events located by trial steps", "step", PAPER_STEP, (1e-6, 0.1), rk4_located),
+            Solver("dop853", "DOP853 and events of scipy", "tolerance", TOLERANCE, (1e-13, 1e-3), dop853),
         )
     }
 )

@@ -287,12 +287,16 @@ class BenchConfiguration(Parameters):
         if self.backend != "hardware":
             return self
         if watchdog is not None and watchdog < _BLOCKS_OF_WATCHDOG * block:
-            allowed = f"the watchdog is reset once per block of {block:g} s: set {_BLOCKS_OF_WATCHDOG} blocks or more"
+            allowed = (
+                f"the watchdog is reset once per block of {block:g} s: set a time-out of {_BLOCKS_OF_WATCHDOG} blocks "
+                "or more"
+            )
             raise InvalidInput("hardware.daq.watchdog", watchdog, allowed)
         heartbeat = self.hardware.daq.heartbeat
         if heartbeat is not None and heartbeat.timeout < _BLOCKS_OF_HEARTBEAT * block:
             allowed = (
-                f"the heartbeat rises every second block of {block:g} s: set {_BLOCKS_OF_HEARTBEAT} blocks or more"
+                f"the heartbeat rises every second block of {block:g} s: set a time-out of {_BLOCKS_OF_HEARTBEAT} "
+                "blocks or more"
             )
             raise InvalidInput("hardware.daq.heartbeat.timeout", heartbeat.timeout, allowed)
         if self.hardware.lasers.connection == "serial" and block < _SHORTEST_WITH_SERIAL_LASERS:

@@ -140,7 +140,7 @@ def _with_certificates(configuration: BenchConfiguration, path: Path) -> BenchCo
 
 
 def with_identified(configuration: BenchConfiguration, identified: Identified) -> BenchConfiguration:
-    """The configuration with the given identified properties. Raises InvalidInput if the specimen is impossible."""
+    """The configuration with the given identified properties. Raises InvalidInput for a specimen that is impossible."""
     identified.applied(configuration.specimen)
     return configuration.model_copy(update={"specimen_file": None, "identified": identified})
 

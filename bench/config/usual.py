@@ -65,8 +65,8 @@ def off_resonance(parameters: Parameters, modes: tuple[float, float]) -> Iterato
             where = "below" if value < modes[0] else "above"
             natural = " and ".join(f"{mode:.3g}" for mode in modes)
             yield (
-                f"{said} is far {where} the modes of the bare frame, {natural} rad/s: if Hz is intended, write it "
-                "with its unit"
+                f"{said} is far {where} the modes of the bare frame, {natural} rad/s: if the value is in Hz, "
+                "add the unit"
             )
 
 

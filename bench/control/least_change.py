@@ -77,7 +77,7 @@ class SineModes:
         return whole
 
     def products(self, weights: Array) -> Array:
-        """Products of `weights` at the samples, shape (n,), with each mode, shape (k,)."""
+        """Scalar products of `weights` at the samples, shape (n,), with each mode, shape (k,)."""
         return 0.5 * _transformed(weights[1:-1])[self._below : self._below + self._steps.size]
 
     def motions(self, samples: NDArray[np.intp]) -> tuple[Array, Array]:
@@ -249,7 +249,7 @@ class _Problem:
             self._bounds += new
             more, values = self._inequalities(new)
             held, needed = np.concatenate((held, rows(more))), np.concatenate((needed, values))
-        raise self._refusal("the search ended before a change kept the record")
+        raise self._refusal("the search found no change that keeps the record")
 
     def _equations(self) -> tuple[Array, Array]:
         """A and b of the equations A sizes = b, which make the table's velocity and displacement zero at the end of the

@@ -213,7 +213,7 @@ def _filtered(record: SampledRecord, band: tuple[float, float]) -> tuple[Sampled
 
 
 def _factor(record: SampledRecord, peak: float) -> float:
-    """Scale factor for the requested peak."""
+    """Factor that scales the record to the requested `peak` [m/s2]."""
     if not (np.isfinite(peak) and peak > 0.0):
         raise InvalidInput("peak", peak, "it must be a positive acceleration")
     there = float(np.abs(record.acceleration).max())

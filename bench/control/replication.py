@@ -236,7 +236,7 @@ class Replication:
             if refused or self._verdict.share < _LEAST_SHARE:
                 self._status = "limited"
             elif np.array_equal(self._drive, self._best):
-                # no line has an error above the non-repeatable part
+                # no spectral line has an error above the non-repeatable part
                 self._status = "converged"
 
     def _next(self) -> tuple[Array, float, Verdict]:

@@ -57,7 +57,7 @@ class Candidate:
 
     @property
     def duration(self) -> float:
-        """Duration [s]."""
+        """Total duration of the segments [s]."""
         return sum(segment.duration for segment in self.segments)
 
 
@@ -137,7 +137,7 @@ class Start:
 
     @property
     def duration(self) -> float:
-        """Duration [s]."""
+        """Total duration of the segments [s]."""
         return sum(segment.duration for segment in self.segments)
 
 

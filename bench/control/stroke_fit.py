@@ -89,7 +89,7 @@ TIGHTER = 0.995
 """Factor by which the reach is reduced from one fit to the next."""
 
 SAME = 0.01
-"""Largest difference between the fitted motion and its band-limited version, as a fraction of the reach."""
+"""Largest accepted deviation of the band-limited displacement from the fitted one, as a fraction of the reach."""
 
 ROUNDING = 1e-9
 """Fraction of the peak velocity or displacement below which a value counts as zero."""

@@ -136,7 +136,7 @@ class Reach:
 
     @staticmethod
     def of(configuration: BenchConfiguration, share: float = SHARE) -> "Reach":
-        """The fraction `share` of the bench's stroke and limits."""
+        """The fraction `share` of the smaller of half stroke and displacement limit, and of the velocity limit."""
         limits = configuration.limits
         return Reach(share * min(configuration.half_stroke, limits.displacement), share * limits.velocity)
 

@@ -201,7 +201,7 @@ def clip_text(text: str, width: int) -> bytes:
 
 
 def replace_text(target: Dataset, text: str, width: int) -> None:
-    """Replace the string in a scalar of `width` bytes; truncates it if necessary."""
+    """Replace the string in a scalar of `width` bytes; a longer `text` is truncated."""
     target[()] = np.array(clip_text(text, width), dtype=text_type(width))
 
 

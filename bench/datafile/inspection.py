@@ -165,7 +165,7 @@ def _of_record(record: DataFile, size: int) -> Iterator[str]:
             "writes a clean file"
         )
     if not record.channels:
-        yield "the file has no channel"
+        yield "the file contains no channels"
     entry = hdf5.group(record.file, "entry")
     if record.format_version > 1 and GROUP not in entry:
         yield "the checksums are missing"

@@ -179,7 +179,7 @@ class DataFile(SampleReader):
 
     @property
     def events(self) -> list[JournalEntry]:
-        """The journal."""
+        """The entries of the journal."""
         return [JournalEntry(**row) for row in self._rows("events")]
 
     @property

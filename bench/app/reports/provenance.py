@@ -1,4 +1,4 @@
-"""Provenance of a report's numbers: file, people, software, parameters, bench, clocks."""
+"""Provenance of a report's numbers: data file, operator, software, parameters, bench and sensor clocks."""
 
 from collections.abc import Iterator, Mapping
 from datetime import UTC, datetime
@@ -58,7 +58,7 @@ def program(version: str, git: str, digits: int = 40) -> str:
 
 
 def libraries(versions: Mapping[str, str]) -> str:
-    """Versions of the libraries that affect the results."""
+    """Names and versions of the libraries that affect the results."""
     return ", ".join(f"{name} {version}" for name, version in versions.items() if name != NAME)
 
 

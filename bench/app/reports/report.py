@@ -124,7 +124,9 @@ MOST_MODES = 4
 
 
 def campaign_report(campaign: Campaign, protocol: Protocol[Any] | None = None, progress: Progress = silent) -> Document:
-    """The complete report. Raises InvalidInput for a file without a usable specimen."""
+    """The complete report; without `protocol`, only the sections common to all campaigns. Raises InvalidInput for a
+    file without a usable specimen.
+    """
     load_model(progress)
     makers: list[Callable[[], Sequence[Section | None]]] = [
         lambda: _results(campaign, protocol),

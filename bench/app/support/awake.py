@@ -59,7 +59,9 @@ def awake(system: str = sys.platform) -> Generator[bool]:
 
 @contextmanager
 def _thread_required(set_state: Callable[[int], int]) -> Generator[bool]:
-    """Context manager in which this thread requires a running system; `set_state` returns 0 when it fails."""
+    """Context manager that keeps Windows awake by `set_state`, which returns 0 if it fails; yields whether it
+    succeeded.
+    """
     required = set_state(CONTINUOUS | SYSTEM_REQUIRED) != 0
     try:
         yield required

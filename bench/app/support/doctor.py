@@ -18,7 +18,7 @@ from bench.provenance import software
 
 OLDEST = (3, 11)
 RESOLUTION = 1e-4
-"""Coarsest acceptable step of the computer's clock [s]."""
+"""Largest acceptable step of the computer's clock [s]."""
 LATE = 0.005
 """Largest acceptable delay of a sleep of 1 ms [s]; it must be short compared with a default block of samples."""
 SPEED = 20e6
@@ -30,7 +30,7 @@ LATENCY = 1
 
 
 class Health(StrEnum):
-    """Result of a check."""
+    """Result of a check of the computer."""
 
     GOOD = "good"
     NOTICE = "notice"
@@ -74,7 +74,7 @@ def examine(folder: Path, port: str | None = None) -> Iterator[Finding]:
 
 
 def versions() -> Finding:
-    """Check Python and the libraries."""
+    """Check the version of Python, which must have 64 bits; the finding also lists the versions of the libraries."""
     versions = ", ".join(f"{name} {version}" for name, version in software().items())
     good = sys.version_info[:2] >= OLDEST and sys.maxsize > 2**32
     remedy = "" if good else f"install a 64-bit Python, {OLDEST[0]}.{OLDEST[1]} or newer"
@@ -128,7 +128,7 @@ def disk_speed(folder: Path) -> Finding:
 
 
 def power(governor: Path = Path("/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor")) -> Finding:
-    """Check whether the processor is throttled to save power."""
+    """Check whether the processor's frequency governor saves power; unknown on systems other than Linux."""
     item = "power settings"
     if not governor.is_file():
         return Finding(item, Health.UNKNOWN, "not determined", "switch off sleep and USB suspend during runs")

@@ -50,7 +50,7 @@ class Feed:
             return self._version, b"{%b}" % b",".join(b'"%b":%b' % (name.encode(), text) for name, text in found)
 
     def close(self) -> None:
-        """End all waits."""
+        """Close the feed, and end all waits for changes."""
         with self._changed:
             self.closed = True
             self._changed.notify_all()

@@ -127,7 +127,7 @@ class RunRecord:
                 pass
 
     def expected(self, place: tuple[int, int]) -> datetime | None:
-        """Estimated end of a point of the campaign; None if unknown, or if it is complete."""
+        """Estimated end of the point at `place`; None if it is unknown, or if the point is complete."""
         if self.campaign is None or self.over:
             return None
         return self.campaign.expected(place, self.state.scene.time_left, datetime.now())
@@ -170,7 +170,7 @@ class SessionFollower:
 
     @property
     def status(self) -> Status:
-        """Status of the bench."""
+        """Status of the bench for the page, with or without a session."""
         client = self._client
         if client is not None:
             return self.record.state.status(client.status, client.silence, lives=client.lives)

@@ -76,7 +76,7 @@ class PageServer(ThreadingHTTPServer):
 
     @property
     def url(self) -> str:
-        """Address of the page."""
+        """Address (URL) of the page, including the token."""
         host, port = str(self.server_address[0]), self.server_address[1]
         if not is_loopback(host) and ip_address(host).is_unspecified:
             host = gethostname()

@@ -158,7 +158,7 @@ def _specimen(**frame: float) -> BenchConfiguration:
 def test_a_frequency_in_hertz_typed_for_one_in_radians_a_second_is_noticed() -> None:
     (notice,) = notices_of(HarmonicParameters(omega=(2.5, 16.0)), Specimen())
     assert notice.startswith("omega[0] = 2.5 rad/s = 0.40 Hz is far below the modes of the bare frame, 6.32 and 16.4")
-    assert "if Hz is intended" in notice
+    assert "if the value is in Hz" in notice
     (notice,) = notices_of(SineRequest(omega=(2.5 * (2.0 * pi) ** 2,)), Specimen())
     assert "is far above" in notice
     assert notices_of(HarmonicParameters(), Specimen()) == ()
