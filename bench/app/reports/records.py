@@ -46,7 +46,7 @@ def record_pictures(records: Sequence[Accelerogram]) -> Iterator[Picture]:
 
 
 def gains_picture(curves: Sequence[SeismicCurve], words: str) -> Picture:
-    """Figure of alpha_2 and alpha_1 against the stiffness ratio, by record; `words` describes their band."""
+    """Figure of alpha_2 and alpha_1 against the stiffness ratio, by record; `words` describes their frequency band."""
 
     def known(gains: Sequence[float | None]) -> NDArray[np.float64]:
         return np.array([np.nan if gain is None else gain for gain in gains])
@@ -71,7 +71,7 @@ def gains_picture(curves: Sequence[SeismicCurve], words: str) -> Picture:
 
 
 def motions_table(curves: Sequence[SeismicCurve]) -> Table:
-    """Table of table motion, range of alpha_2 and share of stiffness ratios at which the block topples, by record."""
+    """Results by record: the table's motion, the range of alpha_2, and the share of stiffness ratios with toppling."""
     columns = [
         Column("record", words=True),
         Column("band", "Hz", words=True),
