@@ -1,4 +1,4 @@
-"""Text files of bounded size and depth: configurations, records, specimens, queues."""
+"""Limits of size and nesting depth for text files: configurations, records, specimens, queues."""
 
 from pathlib import Path
 from typing import Any, cast

@@ -17,7 +17,7 @@ ENDINGS: dict[str, Kind] = {
     "table_model.json": "table model",
     "laser_calibration.json": "laser calibration",
 }
-"""Endings of the names under which runs and re-analyses write these files."""
+"""Kinds of result by the endings of the file names that runs and re-analyses write."""
 
 
 @dataclass(frozen=True)
@@ -28,8 +28,8 @@ class UsableResult:
     kind: Kind
 
     def applied(self, configuration: BenchConfiguration) -> BenchConfiguration:
-        """The configuration with this result instead of its corresponding values. Raises InvalidInput if the file
-        cannot be read, or the result is not valid for the bench.
+        """The configuration with its corresponding values replaced by this result. Raises InvalidInput if the file
+        cannot be read, or if the result is not valid for the bench.
         """
         if self.kind == "specimen":
             changed = with_identified(configuration, read_specimen(self.path))

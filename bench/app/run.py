@@ -40,6 +40,7 @@ def run(
     """Run a protocol and return its campaign, whose `status` states how it ended.
 
     parameters, more : parameters of the protocol, as a mapping and as keyword arguments.
+    configuration : configuration of the bench or its file; by default, a simulated bench.
     specimen : specimen file (.json).
     seed, realtime : seed of a simulated bench, and whether it runs in real instead of virtual time.
     out : folder for the results, by default runs/<protocol>-<date>T<time>.
@@ -111,7 +112,7 @@ class _Person:
         self.name = "the bench itself" if answer is None else "operator of the script"
 
     def confirm(self, request: str) -> bool:
-        """Return the answer; Ctrl-C during the wait counts as a refusal."""
+        """Whether the task of `request` is done; Ctrl-C during the wait counts as a refusal."""
         if self._answer is None:
             return True
         self.asking = True

@@ -12,12 +12,12 @@ from bench.events import Event, PointFinished, Progress, State, StateChanged, St
 from bench.live_values import Estimate, LiveValue, RunningGain, TwinEstimate
 
 NOTICES = 5
-"""Number of the latest events that are displayed."""
+"""Maximum number of displayed notices; the latest are kept."""
 
 
 @dataclass(frozen=True)
 class Notice:
-    """A line of the log; `kind` is one word, and `grave` is True for a line that needs the operator's attention."""
+    """A line of the log, with bench `time` [s]; `grave` is True for a line that needs the operator's attention."""
 
     time: float
     kind: str
@@ -27,7 +27,7 @@ class Notice:
 
 @dataclass(frozen=True)
 class Row:
-    """A point of the campaign as text, finished or in progress; the name of a record replaces the frequency."""
+    """Texts of a point, finished or in progress; under an earthquake record, `omega` contains the record's name."""
 
     omega: str
     beta: str
@@ -53,7 +53,7 @@ class Row:
             status=str(point.get("status", ABSENT)),
             alpha_2=plus_minus(value, point.get("alpha_2_uncertainty")),
             predicted=number(predicted) + (" unstable" if unstable else ""),
-            # a motion that is not compared with the prediction may be on another branch
+            # without a verdict, the motion may be on a solution branch other than the predicted one
             difference=ABSENT if agrees is None else difference(value, predicted),
             agrees=ABSENT if agrees is None else "yes" if agrees else "NO",
             effort=f"{effort}, {starts} starts" if starts and starts > 1 else effort,
@@ -62,7 +62,7 @@ class Row:
 
     @staticmethod
     def running(estimate: Estimate) -> "Row":
-        """Row of the running estimate of the current point."""
+        """Row of the current point, from its running estimate."""
         return Row(
             omega=setpoint(estimate.omega),
             beta="bare" if estimate.beta is None else setpoint(estimate.beta),
@@ -76,7 +76,7 @@ class Row:
 
     @staticmethod
     def during_record(running: RunningGain) -> "Row":
-        """Row of the running gain under the current record."""
+        """Row of the point under the current record, from its running gain."""
         return Row(
             omega=one_line(running.record),
             beta="bare" if running.beta is None else setpoint(running.beta),
@@ -91,7 +91,7 @@ class Row:
 
     @property
     def where(self) -> str:
-        """The frequency with its unit, or the record."""
+        """The circular frequency with its unit, or the name of the earthquake record."""
         return self.omega if self.under_record else f"omega {self.omega} rad/s"
 
     @property
@@ -129,7 +129,7 @@ def notice_of(event: Event) -> Notice | None:
 
 
 def twin_line(event: TwinEstimate) -> str:
-    """Peak drifts, difference of measured and modelled drift, and gains, if any, with the model's band."""
+    """Peak drifts, residual, gains with the model's band if known, and fraction of standing blocks if below 1."""
     words = [f"drift peak {_millimetres(event.drift_peak_measured)}, model {_millimetres(event.drift_peak)}"]
     words.append(f"residual {_share(event.residual)}, outside the band {_share(event.excess)}")
     if isfinite(event.alpha_2):
@@ -152,7 +152,7 @@ def _share(value: float) -> str:
 class RunDisplay:
     """The displayed state of a run.
 
-    rows, running : points that are finished, and the point in progress.
+    rows, running : rows of the finished points, and row of the point in progress.
     twin : latest line on the live twin.
     live : live values of the protocol, one line each, by label.
     notices : latest log lines about other events.
@@ -176,7 +176,7 @@ class RunDisplay:
     _estimated_at: float = 0.0
 
     def prepare(self, phase: str, done: int, total: int) -> None:
-        """Show a stage before the rig is opened or after it is closed."""
+        """Show a stage before the rig is opened or after it is closed; `done` of its `total` parts are complete."""
         now = monotonic()
         if phase != self.reason:
             self.reason, self._begun = one_line(phase), now
@@ -185,8 +185,8 @@ class RunDisplay:
         self._estimated_at, self.preparing = self.time, True
 
     def expect(self, duration: float | None) -> None:
-        """Show the `duration` of the plan [s], None if unknown; called once the rig is open. The run's own reports of
-        progress replace it.
+        """Show the planned `duration` [s], None if unknown; called once the rig is open. The first progress event that
+        has a remaining time replaces it.
         """
         self.fraction, self.remaining, self.preparing = 0.0, nan if duration is None else duration, False
         self.reason, self._estimated_at = "", self.time

@@ -71,8 +71,8 @@ def run_session(
     about : name of the operator and notes, stored in the data file with the metadata of the run.
     progress : receives the stages before the rig is opened and after it is closed.
 
-    Raises InvalidInput before the table moves, and KeyboardInterrupt if an end was requested before then. Once the rig
-    is armed, every ending is a result with a status.
+    Raises InvalidInput before the table moves, and KeyboardInterrupt if an end is requested before the data file is
+    created. Once the rig is armed, every ending is a result with a status.
     """
     started = time.monotonic()
     name = f"the protocol {protocol.name}"
@@ -83,7 +83,7 @@ def run_session(
         with plugin_code(name, files=True):
             preflight = compile_run(protocol.name, prepared, out, progress)
         preflight.require()
-        # set after the plan was hashed, because the hash must not depend on the speed
+        # the pace is set only after the plan is hashed, because the hash must not depend on it
         configuration = prepared.configuration.at_pace(realtime=realtime)
         progress("predicting the results")
         with plugin_code(name):
@@ -100,7 +100,7 @@ def run_session(
         virtual = isinstance(rig.clock, VirtualClock)
         if not virtual:
             held.enter_context(awake())
-        # opening takes a long time: an end requested meanwhile leaves neither folder nor file
+        # opening the rig may take long: an end requested meanwhile leaves neither folder nor file
         if requests.strongest is not None:
             raise KeyboardInterrupt
         out.mkdir(parents=True, exist_ok=True)
@@ -177,7 +177,7 @@ def run_session(
 
 
 def _closing(rig: Rig) -> Ending | None:
-    """Close the rig. Returns an ending if this fails, else None."""
+    """Close the rig. Returns a failed ending if an error occurs, else None."""
     try:
         rig.close()
     except RigError as error:

@@ -1,7 +1,7 @@
-"""The standard case: 120 s of steady rocking with 649 impacts, and its independently known values.
+"""The standard case: 120 s of steady rocking with 649 impacts, with independent reference values.
 
-START and PHASE are the periodic orbit at beta 0.64, Omega 17 rad/s to ten digits: they define the case and are taken as
-exact. END and PEAKS are its solution by heyoka in 80-bit arithmetic at tolerance 1e-19, with an integrator and
+START and PHASE give the periodic orbit at beta 0.64, Omega 17 rad/s to ten digits: they define the case and are taken
+as exact. END and PEAKS are its solution by heyoka in 80-bit arithmetic at tolerance 1e-19, with an integrator and
 equations that are independent of this program; `tests/benchmarks/reference.py` recomputes them and checks the beginning
 of the motion with mpmath at 30 digits.
 """
@@ -31,19 +31,19 @@ END: NDArray[np.float64] = np.array(
         -0.23633857278366831926,
     ]
 )
-"""State after DURATION, in the form of `State.as_array`."""
+"""State after DURATION: u1, u2 [m], their velocities [m/s], theta [rad] and its velocity [rad/s]."""
 
 PEAKS = (0.00082052486744979255383, 0.0060632412081126333043, 0.033611621224326909147)
 """Largest |u1|, |u2 - u1| [m] and |theta| [rad] of the whole run."""
 
 
 def drive(duration: float = DURATION) -> SineProgram:
-    """The base excitation."""
+    """The base excitation over `duration` [s]."""
     return SineProgram([Sweep.dwell(duration, AMPLITUDE, OMEGA)], phase=PHASE)
 
 
 def error_of(end: NDArray[np.float64]) -> float:
-    """Largest deviation of an end state, shape (6,), from END, in SI units; velocities are of the order of 1 m/s."""
+    """Largest absolute deviation of an end state, shape (6,), from END; all components are in SI units."""
     return float(np.abs(end - END).max())
 
 

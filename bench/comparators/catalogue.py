@@ -38,7 +38,7 @@ def paper(problem: Problem, step: float) -> Motion:
     from bench.comparators.kernel.fixed_step import run_paper
 
     x, samples, report = _outputs(problem)
-    # only records have segments without sines
+    # only sampled records consist of segments without a sine
     seismic = not problem.segments[:, 1:5].any()
     run_paper(
         problem.parameters,
@@ -56,8 +56,8 @@ def paper(problem: Problem, step: float) -> Motion:
 
 
 def rk4_located(problem: Problem, step: float) -> Motion:
-    """RK4 with steps of at most `step` that end at events; events are located by steps of other lengths, which
-    preserves order 4 across impacts.
+    """RK4 with steps of at most `step` [s] that end at events. An event is located by trial steps of other lengths,
+    which preserves order 4 across impacts.
     """
     from bench.comparators.kernel.located_step import run_located
 
@@ -111,9 +111,9 @@ SOLVERS: Mapping[str, Solver] = MappingProxyType(
                 (1e-15, 1e-3),
                 None,
             ),
-            Solver("paper", "RK4 at 1 ms with a sign test, as in section 3.3", "step", PAPER_STEP, (1e-6, 0.1), paper),
-            Solver("rk4-located", "RK4 with events located by stepping", "step", PAPER_STEP, (1e-6, 0.1), rk4_located),
-            Solver("dop853", "scipy's DOP853 with its events", "tolerance", TOLERANCE, (1e-13, 1e-3), dop853),
+            Solver("paper", "RK4 with a sign test, as in the paper", "step", PAPER_STEP, (1e-6, 0.1), paper),
+            Solver("rk4-located", "RK4, events located by trial steps", "step", PAPER_STEP, (1e-6, 0.1), rk4_located),
+            Solver("dop853", "DOP853 and events of scipy", "tolerance", TOLERANCE, (1e-13, 1e-3), dop853),
         )
     }
 )
@@ -136,8 +136,8 @@ def solve(
     a default.
 
     With `paper` the block never returns to rest, impacts occur at ends of steps and peaks are sampled at steps. The
-    others converge to `taylor` with their order. Raises InvalidInput for an unknown name, the accuracy parameter of
-    another solver, or a value out of range.
+    other solvers converge to `taylor` at their order. Raises InvalidInput for an unknown name, the accuracy parameter
+    of another solver, or a value out of range.
     """
     solver = SOLVERS.get(name)
     if solver is None:

@@ -10,18 +10,18 @@ from bench.comparators.case import DURATION, SPECIMEN, START
 from bench.comparators.libraries import equations
 
 BATCH = 4
-"""Trajectories of a batch: the doubles of an AVX2 register."""
+"""Number of trajectories in a batch: the number of doubles in an AVX2 register."""
 
 
 class HeyokaBatch:
-    """The standard case BATCH times, compiled on construction; no peaks."""
+    """`BATCH` identical trajectories of the standard case, without peaks; compiled on construction."""
 
     def __init__(self, tolerance: float) -> None:
         hy = import_module("heyoka")
         counts = self._impacts = [0] * BATCH
         restitution = SPECIMEN.block.restitution
 
-        # a function, not a method, because heyoka copies a callback with every object bound to it
+        # a function, not a method, because heyoka copies a callback together with the object to which it is bound
         def strike(ta: Any, _sign: int, place: int) -> bool:
             counts[place] += 1
             ta.state[4, place] = 0.0

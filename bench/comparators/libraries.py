@@ -3,14 +3,14 @@ by LLVM.
 
 The equations for heyoka are deliberately written out here: an independent reference must not share those of this
 program. One system covers both corners, with the sign of the corner as a parameter that the impact changes. The event
-is a falling sg theta. If theta itself were the event, the start of the case at theta = 0 would count as an impact, so
-that the block would be on the wrong corner and overturn. sg theta rises from every impact and from the start, and a
-rising root is not an event, so that no guard time after an impact is required. The impacts of the case are strong and
-do not test heyoka's protection against chatter.
+is a falling root of sg theta. If theta itself were the event, the start of the case at theta = 0 would count as an
+impact, so that the block would be on the wrong corner and overturn. sg theta rises from every impact and from the
+start, and a rising root is not an event, so that no guard time after an impact is required. The impacts of the case are
+strong and do not test heyoka's protection against chatter.
 
 CVODE (SUNDIALS), used through scikit-sundae, has its own root finding. It is a multistep method and restarts at order 1
 after every impact. It uses this program's equations, so only the integrators are compared. The root at the start of a
-phase is divided out of the event.
+phase is divided out of the event function.
 """
 
 from dataclasses import dataclass
@@ -61,7 +61,7 @@ class HeyokaPeer:
         )
 
     def run(self, duration: float = DURATION) -> Outcome:
-        """Integrate the case from its start."""
+        """Integrate the case from START over `duration` [s]."""
         ta = self._integrator
         ta.state[:] = START.as_array().astype(self._real)
         ta.pars[0], ta.time = self._real(1), self._real(0)
@@ -75,7 +75,7 @@ class HeyokaPeer:
         return Outcome(np.array(ta.state), self._impacts, int(steps), peaks)
 
     def _on_impact(self) -> Any:
-        # a function, not a method, because heyoka copies a callback with every object bound to it
+        # a function, not a method, because heyoka copies a callback together with the object to which it is bound
         def strike(ta: Any, _sign: int) -> bool:
             self._impacts += 1
             ta.state[4] = self._real(0)
@@ -97,7 +97,7 @@ class HeyokaPeer:
 
 
 def equations(hy: Any, real: Any) -> list[tuple[Any, Any]]:
-    """Eq. (8) and (A.1) in a form without cancellation at small angles."""
+    """Eq. (8) and (A.1) of the paper for heyoka, in a form without cancellation at small angles."""
     m1, m2, k1, k2, c1, c2, h1, k_c, d, b, h_b, mass, inertia, _, g, _ = (real(v) for v in SPECIMEN.packed()[:16])
     u1, u2, v1, v2, theta, omega = hy.make_vars("u1", "u2", "v1", "v2", "theta", "omega")
     sg = hy.par[0]
@@ -125,7 +125,7 @@ Vector = NDArray[np.float64]
 
 
 class CvodePeer:
-    """The standard case at one relative tolerance; the absolute tolerance is a hundredth of it."""
+    """CVODE on the standard case with the relative `tolerance`; the absolute tolerance is a hundredth of it."""
 
     def __init__(self, tolerance: float) -> None:
         from bench.comparators.kernel.fixed_step import driven_rates

@@ -1,8 +1,8 @@
 # pyright: reportUnknownMemberType=false, reportUnknownVariableType=false, reportUnknownArgumentType=false
 """scipy's integrators with their own events, one call for each phase and segment of the excitation.
 
-The pyright comment in the first line is needed because scipy's result has no types. The integrator restarts at each
-event and breakpoint, across which its error estimate is invalid.
+The pyright comment in the first line is needed because scipy's result has no type annotations. The integrator restarts
+at each event and breakpoint, across which its error estimate is invalid.
 """
 
 from collections.abc import Callable
@@ -118,7 +118,7 @@ def integrate(method: Method, problem: Problem, tolerance: float, equations: Dri
 
 
 def python_rates(p: Vector, sg: float, row: Vector, t: float, x: Vector, out: Vector) -> None:
-    """`bench.comparators.kernel.fixed_step.driven_rates` without compilation, like most right-hand sides passed to
+    """Uncompiled `bench.comparators.kernel.fixed_step.driven_rates`, comparable to most right-hand sides passed to
     scipy.
     """
     from bench.comparators.kernel import fixed_step
@@ -128,7 +128,7 @@ def python_rates(p: Vector, sg: float, row: Vector, t: float, x: Vector, out: Ve
 
 
 def _python(function: Any) -> Any:
-    """The Python function from which a function was compiled."""
+    """The Python function from which `function` was compiled."""
     return function.py_func
 
 
@@ -169,7 +169,7 @@ def _events(
 
 
 def _raise_peaks(peaks: Vector, solution: Any, start: float) -> None:
-    """Raise `peaks` to the largest magnitudes of the dense output from `start` on."""
+    """Raise `peaks` to the largest magnitudes of the dense output from `start` [s] on."""
     from scipy.optimize import brentq
 
     times = np.array([start, *(t for t in solution.t if t > start)])

@@ -1,1 +1,1 @@
-"""The bench's configuration: one validated TOML file in which every key has a unit."""
+"""The bench's configuration: one validated TOML file in SI units."""

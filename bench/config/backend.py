@@ -18,7 +18,7 @@ RIGS = "rockbench.rigs"
 
 
 class RigSettings(Parameters):
-    """Table `[rig]` of a configuration: the bench behind a backend of another package.
+    """Table `[rig]` of a configuration: settings of a bench whose backend belongs to another package.
 
     A backend derives its settings class from this one, adds its own keys and may change defaults.
     """
@@ -28,7 +28,7 @@ class RigSettings(Parameters):
     acceleration_range: float | None = quantity(
         None,
         "m/s2",
-        "range of the accelerometer; if absent, it is not compared with limits",
+        "measuring range of the accelerometer; if absent, no limit is checked against it",
         gt=0,
         example=100.0,
     )
@@ -52,7 +52,7 @@ class RigSettings(Parameters):
         example=50.0,
     )
     laser_reference: Literal["ground", "table"] = quantity(
-        "ground", "", "mounting of the lasers: on the ground they measure x + u, on the table u"
+        "ground", "", "mounting of the lasers: on the ground they measure x + u, on the table u (x: table, u: storey)"
     )
     laser_1_range: float = quantity(0.2, "m", "measuring range of the laser on the first storey", gt=0)
     laser_2_range: float = quantity(0.2, "m", "measuring range of the laser on the second storey", gt=0)
@@ -78,7 +78,7 @@ class CommonSettings(Interface):
 
     @property
     def lead_samples(self) -> int:
-        """Drive samples queued ahead of the newest input."""
+        """Number of drive samples queued ahead of the newest input sample."""
         ...
 
     @property
@@ -92,9 +92,9 @@ class RigBackend:
     """A rig backend, named by the configuration key `backend`; the name is that of the entry point.
 
     `open(configuration, settings, realtime)` returns the rig, stopped; the caller closes it. If it raises InvalidInput
-    or RigError, it leaves nothing open. `settings` is the class of its table in the configuration, `extras` the
-    optional dependencies of this program required for such settings. `real_time_only` states that the backend has no
-    virtual time, `operator` that a person performs the tasks between two tests.
+    or RigError, it leaves nothing open. `settings` is the class of its table in the configuration. `extras(settings)`
+    returns the optional dependencies of this program that such settings require. `real_time_only` is True for a backend
+    without virtual time, `operator` if a person performs the tasks between two tests.
     """
 
     open: "Callable[[CommonSettings, Any, bool], Rig]"

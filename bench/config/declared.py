@@ -1,6 +1,7 @@
 """Description of a declared parameter: meaning, unit and limits.
 
-File, command line and error messages describe parameters through this module and therefore agree.
+Configuration files, command line and error messages take the descriptions of parameters from this module, so they
+agree.
 """
 
 from collections.abc import Iterator, Sequence
@@ -45,25 +46,25 @@ class Declared:
     constraints: tuple[object, ...]
     lengths: tuple[object, ...]
     usual: tuple[float, float] | None
-    """Lowest and highest magnitude that cause no notice; see `sim.parameters.usual_of`."""
+    """Smallest and largest usual magnitude; values outside cause a notice. See `sim.parameters.usual_of`."""
     example: Any
     """Example of valid input for a parameter that is absent by default; see `sim.parameters.example_of`."""
     formerly: str | None
-    """Name in earlier versions."""
+    """Name of the field in earlier versions; None if it is unchanged."""
 
     @property
     def group(self) -> type[Parameters] | None:
-        """The nested group of this field, or None for a value or a list."""
+        """Type of the nested group of this field; None for a value or a list."""
         return None if self.many else self.element
 
     @property
     def element(self) -> type[Parameters] | None:
-        """The nested group of this field, which has one group or a list of groups; None for a field of values."""
+        """Type of the nested group, or of each group in a list of groups; None for a field of plain values."""
         return self.kind if isinstance(self.kind, type) and issubclass(self.kind, Parameters) else None
 
     @property
     def choices(self) -> tuple[str, ...]:
-        """The allowed words, or () when the value is not a choice."""
+        """The allowed words, or () if the value is not a choice."""
         if get_origin(self.kind) is Literal:
             return tuple(str(choice) for choice in get_args(self.kind))
         if isinstance(self.kind, type) and issubclass(self.kind, Enum):
@@ -103,12 +104,12 @@ class Declared:
 
 
 def declared(model: type[Parameters]) -> Iterator[Declared]:
-    """The fields of a group of parameters, in order."""
+    """The fields of a group of parameters, in the order of declaration."""
     yield from _fields(model).values()
 
 
 def at(model: type[Parameters], path: Sequence[str | int]) -> Declared | None:
-    """The field at `path`, or one of its values if the path ends with an index; None if there is no such field."""
+    """The field at `path`, described as a single value if the path ends with an index; None if it does not exist."""
     found: Declared | None = None
     group: type[Parameters] | None = model
     for key in path:

@@ -25,7 +25,7 @@ _BLOCKS_OF_WATCHDOG = 3
 _BLOCKS_OF_HEARTBEAT = 4
 """Minimum time-out of a heartbeat relay, in blocks: two heartbeat periods."""
 _SHORTEST_WITH_SERIAL_LASERS = 0.02
-"""Shortest block with serial lasers, whose values arrive in bursts of a few milliseconds [s]."""
+"""Shortest duration of a block with serial lasers [s]; their values arrive in bursts of a few milliseconds."""
 
 _TABLES: dict[str, Literal["simulation", "hardware"]] = {"simulated": "simulation", "hardware": "hardware"}
 """Configuration tables of the built-in backends; any other backend uses `rig`."""
@@ -60,7 +60,7 @@ class BenchConfiguration(Parameters):
     table_model: str | None = quantity(
         None,
         "",
-        "JSON file of an identified table, from which the drive is predicted; if absent, it is predicted "
+        "JSON file of an identified table model, used to predict the drive; if absent, the drive is predicted "
         "from the simulated shaker",
         example="table_model.json",
     )
@@ -72,13 +72,13 @@ class BenchConfiguration(Parameters):
     simulation: Simulation = Simulation()
     hardware: Hardware = Hardware()
     rig: SerializeAsAny[Parameters] | None = quantity(
-        None, "", "settings of a backend of another package, which declares the keys", validate_default=True
+        None, "", "settings of a backend of another package; the backend declares the keys", validate_default=True
     )
     channels: tuple[FurtherChannel, ...] = quantity((), "", "additional analogue sensors, one table each")
 
     @property
     def known_specimen(self) -> Specimen:
-        """Best estimate of the specimen for every prediction: identified where possible, assumed elsewhere."""
+        """Best estimate of the specimen, used for every prediction: identified properties replace assumed ones."""
         return self.specimen if self.identified is None else self.identified.applied(self.specimen)
 
     @property
@@ -101,7 +101,7 @@ class BenchConfiguration(Parameters):
 
     @property
     def sensors(self) -> SensorUncertainty:
-        """Uncertainty of the sensors."""
+        """Uncertainty of the sensors, from the table `analysis`, the lasers' ranges and their calibration."""
         return SensorUncertainty(self.analysis, self.laser_ranges, self.calibrated)
 
     @property
@@ -130,12 +130,12 @@ class BenchConfiguration(Parameters):
 
     @property
     def block_samples(self) -> int:
-        """Samples in one iteration of the acquisition loop."""
+        """Number of samples in a block, which is one iteration of the acquisition loop."""
         return max(round(self.acquisition.block_duration * self.sample_rate), 1)
 
     @property
     def lead_samples(self) -> int:
-        """Drive samples queued ahead of the newest input."""
+        """Number of drive samples queued ahead of the newest input sample."""
         return round(self.acquisition.lead * self.sample_rate)
 
     @property
@@ -150,7 +150,7 @@ class BenchConfiguration(Parameters):
 
     @property
     def shaker_model(self) -> ShakerModel | None:
-        """Model of the shaker loaded with the known specimen; None if its data are absent."""
+        """Model of the shaker loaded with the known specimen; None if moving mass or force constant is absent."""
         specimen, mass = self.known_specimen, self.table_mass
         payload = specimen.frame.m1 + specimen.frame.m2 + specimen.block.mass
         constant = self.settings.force_constant
@@ -172,7 +172,7 @@ class BenchConfiguration(Parameters):
 
     @property
     def laser_reference(self) -> Literal["ground", "table"]:
-        """Mounting of the lasers."""
+        """Mounting of the lasers: "ground" or "table"."""
         return self.settings.laser_reference
 
     @property
@@ -207,7 +207,7 @@ class BenchConfiguration(Parameters):
     @field_validator("backend")
     @classmethod
     def _installed_backend(cls, name: str) -> str:
-        # built-in backends are loaded when a rig is opened
+        # built-in backends are loaded only when a rig is opened
         if name not in _TABLES:
             try:
                 load_backend(name)
@@ -287,11 +287,17 @@ class BenchConfiguration(Parameters):
         if self.backend != "hardware":
             return self
         if watchdog is not None and watchdog < _BLOCKS_OF_WATCHDOG * block:
-            allowed = f"the watchdog is reset once per block of {block:g} s: use at least {_BLOCKS_OF_WATCHDOG} blocks"
+            allowed = (
+                f"the watchdog is reset once per block of {block:g} s: set a time-out of {_BLOCKS_OF_WATCHDOG} blocks "
+                "or more"
+            )
             raise InvalidInput("hardware.daq.watchdog", watchdog, allowed)
         heartbeat = self.hardware.daq.heartbeat
         if heartbeat is not None and heartbeat.timeout < _BLOCKS_OF_HEARTBEAT * block:
-            allowed = f"its line rises in every other block of {block:g} s: use at least {_BLOCKS_OF_HEARTBEAT} blocks"
+            allowed = (
+                f"the heartbeat rises every second block of {block:g} s: set a time-out of {_BLOCKS_OF_HEARTBEAT} "
+                "blocks or more"
+            )
             raise InvalidInput("hardware.daq.heartbeat.timeout", heartbeat.timeout, allowed)
         if self.hardware.lasers.connection == "serial" and block < _SHORTEST_WITH_SERIAL_LASERS:
             allowed = (

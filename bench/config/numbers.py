@@ -4,8 +4,8 @@
     list     12.5 15 17.5          separated by spaces
     range    12:21:4   2:4:5Hz     start:stop:count, ascending, decimal ends exact
 
-Command line, form, configuration and protocol files read every number through this module and therefore accept the same
-input. A comma is never a separator: 0,25 would otherwise be 0 and 25.
+Numbers from the command line, the window's form, configuration files and protocol files are all read by this module, so
+the same input is valid everywhere. A comma is never a separator: 0,25 would otherwise be 0 and 25.
 
 pint converts units, except between frequencies in Hz and angular frequencies, which are converted explicitly with 2 pi:
 pint treats the radian as a pure number.
@@ -23,8 +23,8 @@ from typing import Any, cast
 def converted(digits: str, typed: str, unit: str) -> float:
     """Convert the decimal number `digits` from the unit `typed` to the declared `unit` ("1" for a pure number).
 
-    Raises ValueError, with a remedy, if the typed unit is unknown or has another dimension, if the declared unit allows
-    none, or if the value exceeds the range of a number.
+    Raises ValueError, with a remedy, if the typed unit is unknown or has another dimension, if the value may have no
+    unit (`unit` is empty), or if it exceeds the range of floating-point numbers.
     """
     if unit == "":
         raise ValueError(f"it must be a number without a unit: remove {typed!r}")
@@ -32,7 +32,7 @@ def converted(digits: str, typed: str, unit: str) -> float:
     # in decimal arithmetic, so that 57 mm is exactly 0.057
     value = float(Decimal(digits) * Decimal(repr(factor)))
     if not isfinite(value):
-        raise ValueError("it exceeds the range of a number")
+        raise ValueError("it exceeds the range of floating-point numbers")
     return value
 
 
@@ -108,7 +108,7 @@ def spaced(start: str, stop: str, count: int) -> tuple[float, ...]:
 
 
 def read_number(text: str, unit: str = "1", *, whole: bool = False) -> float:
-    """One number in the SI `unit`, converted if the text has another; an int if `whole`.
+    """One number in the SI `unit`, converted from the unit in the text, if any; an int if `whole`.
 
     Raises ValueError with the correct spelling, or without a message if the text does not resemble a number.
     """
@@ -176,7 +176,9 @@ def require_units_alike(items: Sequence[str]) -> None:
 
 
 def read_band(text: str, unit: str = "Hz") -> tuple[float, float]:
-    """Two ascending positive numbers LOW:HIGH in `unit`, with an optional unit at the end. Raises ValueError."""
+    """Two ascending positive numbers LOW:HIGH in `unit`, with an optional unit at the end. Raises ValueError for
+    any other text.
+    """
     low, colon, high = text.partition(":")
     digits, typed = _parted(high.strip())
     for part in (low, digits):
@@ -203,7 +205,7 @@ def _parted(text: str) -> tuple[str, str]:
         raise ValueError
     unit = text[found.end() :].strip()
     if re.fullmatch(r"[eE][+-]?\d+", unit):
-        raise ValueError("it exceeds the range of a number")
+        raise ValueError("it exceeds the range of floating-point numbers")
     if re.fullmatch(r"[+-]?(0[xXbBoO]\w+|\d+([_ ]\d\w*)+)", text, re.ASCII):
         raise ValueError("write a decimal number: digits, a point, and an exponent such as e-3")
     if unit and _UNIT.fullmatch(unit) is None:
@@ -223,12 +225,12 @@ def _refuse_comma(text: str) -> None:
 def _plain(digits: str) -> float:
     value = float(digits)
     if not isfinite(value):
-        raise ValueError("it exceeds the range of a number")
+        raise ValueError("it exceeds the range of floating-point numbers")
     return value
 
 
 def _converted(digits: str, typed: str, unit: str) -> float:
     if typed == unit:
         return _plain(digits)
-    # only here, because pint takes most of a second to load
+    # only if the units differ, because pint takes most of a second to load
     return converted(digits, typed, unit)

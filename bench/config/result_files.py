@@ -27,7 +27,7 @@ class KeptFile:
     remedy: str
 
     def write(self, path: Path, content: Mapping[str, Any]) -> None:
-        """Write a new JSON file in SI units. Raises InvalidInput if `path` exists or cannot be written."""
+        """Write header and `content` to a new JSON file. Raises InvalidInput if `path` exists or cannot be written."""
         head = dict(zip(_HEAD, (self.format, self.version, software()["rocking-bench"]), strict=True))
         text = json.dumps({**head, **content}, indent=1, ensure_ascii=False, allow_nan=False)
         try:
@@ -40,7 +40,7 @@ class KeptFile:
 
     def read(self, path: Path) -> dict[str, Any]:
         """Contents of a file without its header. Raises InvalidInput if the file cannot be read, or if its format or
-        version differs.
+        version is not the expected one.
         """
         try:
             data: Any = json.loads(read_bounded(path).decode("utf-8-sig"))
@@ -69,7 +69,7 @@ SPECIMEN_FILE = KeptFile(
 
 
 def write_specimen(path: Path, identified: Identified) -> None:
-    """Write a new JSON file in SI units. Raises InvalidInput if `path` exists or cannot be written."""
+    """Write a new specimen file in SI units. Raises InvalidInput if `path` exists or cannot be written."""
     plain = identified.model_dump(mode="json")
     findings = [_with_unit(finding) for finding in plain["findings"]]
     SPECIMEN_FILE.write(path, {"findings": findings, "correlations": plain["correlations"]})
@@ -83,7 +83,7 @@ def read_specimen(path: Path) -> Identified:
 
 
 def _content(path: Path, content: dict[str, Any]) -> dict[str, Any]:
-    """Findings and correlations, with the units checked and removed."""
+    """Findings and correlations of a specimen file, with the units checked and removed."""
     unknown = set(content) - {"findings", "correlations"}
     if unknown:
         raise InvalidInput(f"{path.name}: {min(unknown)}", content[min(unknown)], "there is no such key")
@@ -136,7 +136,7 @@ CALIBRATION_FILE = KeptFile(
 
 
 def write_calibration(path: Path, calibration: LaserCalibration) -> None:
-    """Write a new JSON file in SI units. Raises InvalidInput if `path` exists or cannot be written."""
+    """Write a new calibration file in SI units. Raises InvalidInput if `path` exists or cannot be written."""
     CALIBRATION_FILE.write(path, calibration.model_dump(mode="json"))
 
 

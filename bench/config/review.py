@@ -18,8 +18,8 @@ from sim.parameters import Parameters
 from sim.specimen import Specimen
 
 _ESTIMATE = 2.0
-"""Largest ratio of the limit on an estimated force or current to its value at the accelerometer's range; larger limits
-are treated as typing errors.
+"""Largest accepted ratio of the limit on an estimated force or current to the estimate at the end of the
+accelerometer's range; larger limits are treated as typing errors.
 """
 _LONGEST_WAIT, _LONGEST_DEBOUNCE, _WORST_CLOCK = 60.0, 1.0, 0.1
 """Longest accepted delays of the guard for a missing sensor or block and for an exceeded limit [s], given that the
@@ -27,7 +27,7 @@ table at full velocity crosses its stroke in a quarter of a second; and a relati
 quartz clock.
 """
 _LEAST_ERROR = 1e-7
-"""Smallest plausible linearity error of a triangulation laser [m]: the optoNCDT 1420 resolves 8 um."""
+"""Smallest plausible linearity error of a triangulation laser [m], far below the optoNCDT 1420's resolution of 8 um."""
 _REACH = {
     "acceleration": (0.5, 5000.0),
     "velocity": (0.02, 50.0),
@@ -69,13 +69,13 @@ class _Reach:
 
 
 def review(configuration: BenchConfiguration) -> Review:
-    """Review of a configuration without a protocol."""
+    """Review of a configuration, independent of any protocol."""
     confirmed, refusals, notices = configuration.limits.confirmed, list[InvalidInput](), list[str]()
     for reach in _reaches(configuration):
         value = float(getattr(configuration.limits, reach.limit))
         if value <= reach.most:
             continue
-        why = f"it can never trip: the maximum of {reach.owner} is {reach.most:.4g} {reach.unit}".rstrip()
+        why = f"it can never trip: {reach.owner} allows at most {reach.most:.4g} {reach.unit}".rstrip()
         if reach.limit in confirmed:
             notices.append(f"limits.{reach.limit} = {value:g}: {why}; limits.confirmed names it")
         else:
@@ -99,7 +99,8 @@ def _reaches(configuration: BenchConfiguration) -> Iterator[_Reach]:
     stroke = configuration.half_stroke, "m", f"the stroke ({shaker}.half_stroke)"
     travel = min(stroke, position)
     yield _Reach("displacement", *travel)
-    # |v|^2 <= 2 |x| |a| for a motion from rest to rest within them (J. Hadamard, C. R. Soc. Math. France 41, 1914)
+    # |v|^2 <= 2 |x| |a| for a motion from rest to rest with these maxima (J. Hadamard, C. R. Soc. Math. France 41,
+    # 1914)
     owner = f"a motion within {travel[2]} and {acceleration[2]}"
     yield _Reach("velocity", sqrt(2.0 * travel[0] * acceleration[0]), "m/s", owner)
     yield _Reach("acceleration", *acceleration)
@@ -113,7 +114,7 @@ def _reaches(configuration: BenchConfiguration) -> Iterator[_Reach]:
 
 
 def _loads(configuration: BenchConfiguration, acceleration: float) -> Iterator[_Reach]:
-    """Reach in force and current: from the shaker's capacity, a channel's range, or the estimate from the motion."""
+    """Largest possible force and current: the shaker's capacity, a sensor's range, or an estimate from the motion."""
     found: dict[str, _Reach] = {}
     shaker_model, hardware, settings = configuration.shaker_model, configuration.hardware, configuration.settings
     if configuration.backend == "simulated":
@@ -142,11 +143,11 @@ def _loads(configuration: BenchConfiguration, acceleration: float) -> Iterator[_
 
 
 _Range = tuple[float, str, str]
-"""Value, unit and cause."""
+"""Largest possible value, its unit, and the component that determines it."""
 
 
 def _ranges(configuration: BenchConfiguration) -> tuple[_Range, _Range, _Range]:
-    """Reach in displacement, acceleration and drive, from the ranges of sensors and output."""
+    """Largest possible displacement, acceleration and drive voltage, from the ranges of sensors and output."""
     if configuration.backend == "simulated":
         bench, key = configuration.simulation.bench, "simulation.bench"
         volts = bench.converter.range
@@ -189,7 +190,7 @@ def _contradictions(configuration: BenchConfiguration) -> Iterator[InvalidInput]
         yield InvalidInput(f"{table}.band_low", low, f"it must be below band_high = {high:g} Hz")
     if high > 0.5 * configuration.sample_rate:
         half = f"half the sample rate, {0.5 * configuration.sample_rate:g} Hz"
-        yield InvalidInput(f"{table}.band_high", high, f"it must not be above {half}")
+        yield InvalidInput(f"{table}.band_high", high, f"it must not exceed {half}")
     if simulated:
         shaker, specimen = configuration.simulation.bench.shaker, configuration.known_specimen
         model = configuration.shaker_model
@@ -206,7 +207,7 @@ def _contradictions(configuration: BenchConfiguration) -> Iterator[InvalidInput]
 
 
 def _waits(configuration: BenchConfiguration) -> dict[str, tuple[float, float, str]]:
-    """Delays of the guard before a limit trips [s] and its tolerance of clock errors, with their upper bounds."""
+    """Delays of the guard [s] and its relative tolerance of clock errors: value, upper bound and unit, by key."""
     limits = configuration.limits
     found = {key: (float(getattr(limits, key)), _LONGEST_WAIT, " s") for key in ("sensor_loss", "stuck", "late")}
     found["clock"] = limits.clock, _WORST_CLOCK, ""
@@ -217,7 +218,7 @@ def _waits(configuration: BenchConfiguration) -> dict[str, tuple[float, float, s
 
 
 def _unusual(configuration: BenchConfiguration) -> Iterator[str]:
-    """Notices about all parts that the backend uses."""
+    """Notices about unusual values in all parts of the configuration that the backend uses."""
     unused = {"simulation", "hardware", "rig"} - {configuration.table}
     for name in type(configuration).model_fields:
         part = getattr(configuration, name)
@@ -245,23 +246,26 @@ def _channels(configuration: BenchConfiguration) -> Iterator[str]:
         low, high = _REACH.get(channel.measures, (0.0, inf))
         if not low <= reach <= high:
             scale = f"sensitivity = {channel.sensitivity:g} and range = {channel.range:g} V"
-            yield f"{item}: with {scale} its range is {reach:.3g} {channel.unit}; usual: {low:g} to {high:g}"
+            yield f"{item}: with {scale} its range is {reach:.3g} {channel.unit}; usual values: {low:g} to {high:g}"
         if channel.limit is not None and channel.limit < _LEAST_SHARE * reach:
             yield f"{item}: limit = {channel.limit:g} {channel.unit} is below 1 % of its range, {reach:.3g}"
         quietest, loudest = (share * reach for share in _NOISE)
         if channel.noise_density and not quietest <= channel.noise_density <= loudest:
             noise = f"noise_density = {channel.noise_density:g} {channel.unit}/Hz^0.5"
             usual = f"usual values: {quietest:.2g} to {loudest:.2g}"
-            yield f"{item}: {noise} with a range of {reach:.3g} {channel.unit}, {usual}"
+            yield f"{item}: {noise} with a range of {reach:.3g} {channel.unit}; {usual}"
 
 
 def _findings(configuration: BenchConfiguration) -> Iterator[str]:
-    """Identified values far from the assumed ones, or with an implausible uncertainty."""
+    """Notices about identified values that are far from the assumed ones or have an implausible uncertainty."""
     for place, finding in enumerate(configuration.identified.findings if configuration.identified else ()):
         item = f"identified.findings[{place}] ({finding.name})"
         relative = finding.standard_uncertainty / finding.value if finding.value else 0.0
         if relative and not 2e-5 <= relative <= 0.5:
-            yield f"{item}: standard_uncertainty = {finding.standard_uncertainty:g} is {relative:.2g} of its value"
+            yield (
+                f"{item}: standard_uncertainty = {finding.standard_uncertainty:g} is {relative:.2g} times the value; "
+                "usual values: 2e-5 to 0.5 times"
+            )
         assumed = _assumed(configuration.specimen, finding.name)
         if assumed and finding.value and not 0.2 <= finding.value / assumed <= 5.0:
             ratio = finding.value / assumed

@@ -13,7 +13,7 @@ class Acquisition(Parameters):
     block_duration: float = quantity(
         0.1,
         "s",
-        "length of a block of samples: one iteration of the acquisition loop",
+        "duration of a block of samples, which is one iteration of the acquisition loop",
         ge=0.005,
         le=0.2,
     )
@@ -21,20 +21,20 @@ class Acquisition(Parameters):
     lead: float = quantity(
         0.1,
         "s",
-        "duration of the drive queued in the output ahead of the newest input, to cover a loop iteration",
+        "duration of the drive queued in the output ahead of the newest input sample, to bridge a loop iteration",
         ge=0.0,
         le=2.0,
     )
 
 
 Profile = Literal["fast", "steady"]
-"""Reaction profiles: the shortest blocks and lead that a device sustains, or blocks and lead for a busy computer."""
+"""Reaction profiles: "fast" for the shortest blocks and lead that a device sustains, "steady" for a busy computer."""
 FAST, FAST_OVER_NETWORK, STEADY = (0.005, 0.01), (0.01, 0.02), (0.1, 0.1)
-"""Block duration and lead [s] for inputs connected to this computer, for those behind a gRPC server, and by default."""
+"""Block duration and lead [s]: fast on this computer, fast through a gRPC server, and steady, which is the default."""
 
 
 def acquisition_of(profile: Profile, *, networked: bool) -> Acquisition:
-    """The timing of a reaction profile; `networked`: each call to the device takes most of a millisecond."""
+    """Timing of a reaction profile; `networked` is for a gRPC server, where each call takes most of a millisecond."""
     fast = FAST_OVER_NETWORK if networked else FAST
     block, lead = fast if profile == "fast" else STEADY
     return Acquisition(block_duration=block, lead=lead)
@@ -45,7 +45,7 @@ class Simulation(Parameters):
 
     seed: int = quantity(1, "", "random seed of the virtual bench", ge=0, lt=2**32)
     bench: VirtualBenchParameters = VirtualBenchParameters()
-    specimen: Specimen | None = quantity(None, "", "the true specimen; if absent, the assumed specimen")
+    specimen: Specimen | None = quantity(None, "", "the simulated specimen; if absent, the assumed specimen")
     spring_factor: float = quantity(1.0, "1", "ratio of true to nominal stiffness of every mounted spring", gt=0, le=10)
 
     @property
@@ -90,7 +90,7 @@ class Simulation(Parameters):
 
     @property
     def laser_reference(self) -> Literal["ground", "table"]:
-        """Mounting of the lasers."""
+        """Mounting of the lasers: "ground" or "table"."""
         return self.bench.laser_1.reference
 
     @property

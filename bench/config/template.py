@@ -1,4 +1,4 @@
-"""Configurations written as TOML: templates with comments, and complete ones."""
+"""Configurations written as TOML: templates with comments, and complete configurations."""
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -15,8 +15,8 @@ from sim.parameters import Parameters
 
 
 def as_toml(configuration: BenchConfiguration) -> str:
-    """All keys with a value. The table `simulation` is omitted for the hardware, both tables of the built-in backends
-    for a backend of another package.
+    """All keys with a value, as TOML. The table `simulation` is omitted for the backend "hardware", and both tables of
+    the built-in backends for a backend of another package.
     """
     unused = {"rig": {"hardware", "simulation"}, "hardware": {"simulation"}}.get(configuration.table, set[str]())
     plain: dict[str, Any] = configuration.model_dump(mode="json", exclude_none=True, exclude=unused)
@@ -56,7 +56,7 @@ _WIRED = {
     "hardware.laser_1.port": "COM5",
     "hardware.laser_2.port": "COM6",
 }
-"""Values, in templates, of the keys without a usable default."""
+"""Values in templates for keys without a usable default."""
 
 _DEVICES = [
     *(f"hardware.{key}" for key in ("sample_rate", "half_stroke", "band_low", "band_high")),
@@ -74,7 +74,7 @@ _DEVICES = [
 
 
 def write_template(path: Path, kind: Kind = "all", backend: str | None = None) -> None:
-    """Write a template of this kind, or for the `backend` of another package.
+    """Write a template of the given `kind`, or one for the `backend` of another package.
 
     Raises InvalidInput if there is no such backend, or if `path` exists or cannot be written.
     """
@@ -102,7 +102,7 @@ def write_template(path: Path, kind: Kind = "all", backend: str | None = None) -
 
 
 def _lines(model: type[Parameters], path: tuple[str, ...]) -> Iterator[str]:
-    """The lines of a table: its values, groups absent by default, then nested tables."""
+    """The lines of a table: first its values, then groups absent by default, then nested tables."""
     entries = list(declared(model))
     for entry in entries:
         if entry.group is None:

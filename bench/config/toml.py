@@ -1,8 +1,8 @@
-"""Configuration files: TOML in SI units, fully validated before anything starts; and their templates.
+"""Configuration files: TOML in SI units, fully validated before anything starts.
 
-A template has every key, the essential keys, or the keys of a bench with NI and optoNCDT devices. Templates are
-generated from the declarations, so that keys, units, limits and defaults are those of the program. Every commented-out
-line is complete: removing its # sets the key.
+A template, written by `bench.config.template`, has every key, the essential keys, or the keys of a bench with NI and
+optoNCDT devices. Templates are generated from the declarations, so that keys, units, limits and defaults are those of
+the program. Every commented-out line is complete: removing its # sets the key.
 """
 
 import re
@@ -55,7 +55,7 @@ def read_table(path: Path, item: str) -> dict[str, Any]:
 
 
 def _hint(text: str, error: str) -> str:
-    """Hint for an invalid line: the correction if it has a decimal comma."""
+    """Hint for an error in a line: the line, and its correction if it contains a decimal comma."""
     line = re.search(r"at line (\d+)", error)
     lines = text.splitlines()
     if line is None or not 0 < int(line[1]) <= len(lines):
@@ -77,7 +77,7 @@ def read_configuration(path: str | PathLike[str]) -> BenchConfiguration:
 
 
 def former_keys(path: str | PathLike[str]) -> tuple[str, ...]:
-    """A notice for each key of a configuration file that still has the name used by an earlier version."""
+    """A notice for each key of a configuration file that has the name used by an earlier version."""
     file = Path(path)
     found = former_names(BenchConfiguration, read_table(file, "configuration file"))
     return tuple(f"{_within(file)(old)} is now called {new}; rename it" for old, new in found)
@@ -118,7 +118,7 @@ def _with_specimen_file(configuration: BenchConfiguration, path: Path) -> BenchC
 
 
 def _with_calibration_file(configuration: BenchConfiguration, path: Path) -> BenchConfiguration:
-    """Replace the name of the calibration file, relative to the same folder, by its contents.
+    """Replace the name of the calibration file, relative to the folder of `path`, by its contents.
 
     Raises InvalidInput if it cannot be read.
     """
@@ -129,7 +129,7 @@ def _with_calibration_file(configuration: BenchConfiguration, path: Path) -> Ben
 
 
 def _with_certificates(configuration: BenchConfiguration, path: Path) -> BenchConfiguration:
-    """Replace the names of the connection's PEM files, relative to the same folder, by their paths."""
+    """Replace the names of the TLS connection's PEM files, relative to the folder of `path`, by absolute paths."""
     tls = configuration.hardware.daq.tls
     if tls is None:
         return configuration
@@ -140,7 +140,7 @@ def _with_certificates(configuration: BenchConfiguration, path: Path) -> BenchCo
 
 
 def with_identified(configuration: BenchConfiguration, identified: Identified) -> BenchConfiguration:
-    """The configuration with the given identified properties. Raises InvalidInput if the specimen is impossible."""
+    """The configuration with the given identified properties. Raises InvalidInput for a specimen that is impossible."""
     identified.applied(configuration.specimen)
     return configuration.model_copy(update={"specimen_file": None, "identified": identified})
 

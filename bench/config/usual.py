@@ -13,11 +13,11 @@ ANGULAR = "rad/s"
 """The unit of circular frequencies; unusual values are shown in Hz too."""
 
 _SLOW, _FAST = 0.6, 2.5
-"""Multiples of the bare frame's first and second natural frequencies between which a frequency is usual."""
+"""Usual frequencies: from `_SLOW` times the first to `_FAST` times the second natural frequency of the bare frame."""
 
 
 _SPRING_OFF = 2.0
-"""Ratio of measured to nominal spring stiffness, or its reciprocal, beyond which a stiffness is unusual."""
+"""Largest usual ratio of a spring stiffness to its nominal value; the smallest is the reciprocal."""
 
 
 class _Watched(NamedTuple):
@@ -29,7 +29,7 @@ class _Watched(NamedTuple):
 def unusual(parameters: Parameters, prefix: str = "") -> Iterator[str]:
     """A notice for each key with a value outside its usual range, naming value and range; keys begin with `prefix`.
 
-    Zero, where allowed, causes no notice. In a list, the first unusual value is named.
+    Zero, where allowed, causes no notice. For a list, the notice names the first unusual value and counts the others.
     """
     values, groups = _watched(type(parameters))
     for watched in values:
@@ -42,7 +42,7 @@ def unusual(parameters: Parameters, prefix: str = "") -> Iterator[str]:
             item, value = outside[0]
             unit = "" if watched.unit == "1" else f" {watched.unit}"
             said = f"{item} = {value:g}{unit}{_in_hertz(value, watched.unit)}{_others(outside)}"
-            yield f"{said} is {'below' if abs(value) < low else 'above'} the usual {low:.3g} to {high:.3g}{unit}"
+            yield f"{said} is {'below' if abs(value) < low else 'above'} the usual range, {low:.3g} to {high:.3g}{unit}"
     for name in groups:
         group = getattr(parameters, name)
         if isinstance(group, Parameters):
@@ -65,13 +65,13 @@ def off_resonance(parameters: Parameters, modes: tuple[float, float]) -> Iterato
             where = "below" if value < modes[0] else "above"
             natural = " and ".join(f"{mode:.3g}" for mode in modes)
             yield (
-                f"{said} is far {where} the modes of the bare frame, {natural} rad/s: if Hz is intended, write it "
-                "with its unit"
+                f"{said} is far {where} the modes of the bare frame, {natural} rad/s: if the value is in Hz, "
+                "add the unit"
             )
 
 
 def in_hertz(parameters: Parameters) -> Iterator[str]:
-    """A line for each circular frequency or list of frequencies, in both units."""
+    """A line for each circular frequency or list of frequencies, in rad/s and Hz."""
     for watched in _watched(type(parameters))[0]:
         values = [value for _, value in _numbers("", getattr(parameters, watched.name))]
         if watched.unit == ANGULAR and values:
@@ -104,7 +104,7 @@ def specimen_notices(specimen: Specimen, prefix: str = "specimen.") -> Iterator[
     for number, dashpot in enumerate(frame.dashpots, 1):
         if dashpot < 0.0:
             ratios = f"{prefix}frame.xi1 = {frame.xi1:g}, xi2 = {frame.xi2:g}"
-            yield f"{ratios} yield dashpot c{number} = {dashpot:.3g} N s/m; a negative dashpot adds energy"
+            yield f"{ratios} give a dashpot c{number} = {dashpot:.3g} N s/m; a negative dashpot adds energy"
     nominal = specimen.spring_k1 or frame.k1
     if not 1.0 / _SPRING_OFF <= nominal / frame.k1 <= _SPRING_OFF:
         yield f"{prefix}spring_k1 = {nominal:g} N/m is {nominal / frame.k1:.3g} times frame.k1 = {frame.k1:g} N/m"

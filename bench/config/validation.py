@@ -216,7 +216,7 @@ def _unit_hint(entry: Declared, value: Any) -> str:
 
 
 def _suggestion(model: type[Parameters], path: Path) -> str:
-    """The most similar known key: at the same level first, then anywhere."""
+    """Hint with the most similar known key, at the same level or anywhere, or else with the valid keys."""
     parent, name = path[:-1], str(path[-1])
     entry = at(model, parent)
     group = model if not parent else entry.group if entry is not None else None
@@ -226,7 +226,7 @@ def _suggestion(model: type[Parameters], path: Path) -> str:
         return f"; the nearest is {dotted((*parent, close[0]))}"
     everywhere = list(keys(model))
     elsewhere = [key for key in everywhere if key.rpartition(".")[2] == name] or get_close_matches(
-        # all paths of a group are similar
+        # a high cutoff, because all paths of a group are similar
         dotted(path),
         everywhere,
         n=1,

@@ -1,4 +1,4 @@
-"""Identification of the table: a periodic multisine with random phases as the drive, and the table's response to it.
+"""Identification of the shake table from its response to a periodic multisine drive with random phases.
 
 The lines of the multisine lie on the grid of its period, so a whole number of periods in steady state has no leakage.
 Within a realisation, the periods differ only by noise. Between realisations, which have different phases, they differ
@@ -88,8 +88,8 @@ def band_lines(samples: int, sample_rate: float, band: tuple[float, float], *, o
 
 
 def drive_amplitudes(frequency: Array, gain: Array, flat: Quantity, corner: float) -> Array:
-    """Relative amplitudes of the drive at `frequency` [Hz] for a motion whose spectrum is flat in `flat` up to `corner`
-    [Hz] and flat in acceleration above it, shape (n,).
+    """Relative amplitudes of the drive at `frequency` [Hz], shape (n,), for a motion with a flat spectrum of the
+    quantity `flat` up to `corner` [Hz], and of acceleration above.
 
     `gain` is the approximate table acceleration per volt, shape (n,); a preliminary `DriveCalibration` suffices.
     """
@@ -140,11 +140,12 @@ def _crest(volts: Array) -> float:
 
 @dataclass(frozen=True)
 class LineResponse:
-    """A response at the lines; all arrays have shape (n_lines,).
+    """Measured frequency response at the lines of a multisine; all arrays have shape (n_lines,).
 
     `response` [unit/V] has the standard `uncertainty` due to noise and distortion together; `noise` is the contribution
     of noise to it, `distortion` the standard deviation of one realisation's response due to distortion alone, NaN for a
     single realisation. `noise_density` [unit/Hz^0.5] is the amplitude spectral density of the noise in the output.
+    `coherence` is that between drive and output.
     """
 
     frequency: Array

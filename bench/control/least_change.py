@@ -17,7 +17,7 @@ from bench.control.target import Reach
 from sim.errors import InvalidInput
 
 INFEASIBLE = 1e-10
-"""Residual of the dual least-squares problem below which no vector satisfies the inequalities."""
+"""Residual of the dual least-squares problem below which the inequalities are treated as infeasible."""
 
 
 class Infeasible(Exception):
@@ -39,7 +39,7 @@ def shortest(equations: tuple[Array, Array], inequalities: tuple[Array, Array]) 
     free, needed = g - (g @ inverse) @ a, h - g @ particular
     if not (needed > 0.0).any():
         return particular
-    # scaled by the distance to the farthest inequality
+    # the scale is the distance to the farthest inequality
     scale = float((needed / np.linalg.norm(free, axis=1)).max())
     dual = np.vstack((scale * free.T, needed))
     target = np.zeros(dual.shape[0])
@@ -54,7 +54,8 @@ def shortest(equations: tuple[Array, Array], inequalities: tuple[Array, Array]) 
 
 
 class SineModes:
-    """sin(k pi j / (n - 1)) at the samples j = 0 to n - 1, for every k whose frequency is `lowest` to `highest` [Hz].
+    """sin(k pi j / (n - 1)) at the samples j = 0 to n - 1, for every k with a frequency from `lowest` to `highest`
+    [Hz].
 
     There are at least two modes. They vanish at both ends of the record.
     """
@@ -76,7 +77,7 @@ class SineModes:
         return whole
 
     def products(self, weights: Array) -> Array:
-        """Products of `weights` at the samples, shape (n,), with each mode, shape (k,)."""
+        """Scalar products of `weights` at the samples, shape (n,), with each mode, shape (k,)."""
         return 0.5 * _transformed(weights[1:-1])[self._below : self._below + self._steps.size]
 
     def motions(self, samples: NDArray[np.intp]) -> tuple[Array, Array]:
@@ -97,7 +98,7 @@ class SineModes:
 
 
 def _transformed(values: Array) -> Array:
-    """Twice the type I discrete sine transform, shape (n,)."""
+    """Type I discrete sine transform in scipy's definition, with a factor of 2; shape (n,)."""
     from scipy.fft import dst
 
     return np.asarray(dst(values, type=1), dtype=np.float64)
@@ -149,10 +150,10 @@ suffice.
 """
 
 CHEAP = 0.5
-"""Frequency [Hz] at which the weight of the squared change is 1; elsewhere it is (f / CHEAP)^4."""
+"""Frequency [Hz] at which the squared change has the weight 1; at a frequency f the weight is (f / CHEAP)^4."""
 
 FLOOR = 0.05
-"""Frequency [Hz] below which the weight is constant, since a slower sine would use up the stroke at once."""
+"""Frequency [Hz] below which the weight is constant; with a smaller weight, slower sines would use up the stroke."""
 
 SPECTRUM = 7.0
 """Duration [s] for which a change as large as the record's peak has the same cost as doubling every oscillator's
@@ -168,7 +169,7 @@ CLOSER = 1e-4
 """Fraction of a limit that the solution reserves for rounding and for the samples between peaks."""
 
 MOST_ROUNDS = 60
-"""Largest number of rounds in which samples are added; a dozen is usual."""
+"""Maximum number of rounds in which samples are added; a dozen is usual."""
 
 
 class _Bound(NamedTuple):
@@ -204,7 +205,7 @@ def fit_by_least_change(
 
 
 class _Problem:
-    """The problem for one record and its limits; constrained samples remain constrained in later solutions."""
+    """Least-change problem of one record and its limits; constrained samples remain constrained in later solutions."""
 
     def __init__(self, acceleration: Array, dt: float, reach: Reach, lowest: float) -> None:
         self._record, self._dt, self._reach = acceleration, dt, reach
@@ -218,7 +219,7 @@ class _Problem:
         self._bounds: list[_Bound] = []
 
     def solved(self, peaks: list[Peak], scales: Array) -> Array:
-        """The record with the least-cost change; changes of the peaks are weighted relative to their scales [m/s2]."""
+        """The record with the least-cost change; changes of the peaks are relative to `scales` [m/s2]."""
         from scipy.linalg import cholesky, solve_triangular
 
         pulls = np.array([self._modes.products(peak.weights) for peak in peaks]) / scales[:, None]
@@ -248,11 +249,11 @@ class _Problem:
             self._bounds += new
             more, values = self._inequalities(new)
             held, needed = np.concatenate((held, rows(more))), np.concatenate((needed, values))
-        raise self._refusal("the search ended before a change kept the record")
+        raise self._refusal("the search found no change that keeps the record")
 
     def _equations(self) -> tuple[Array, Array]:
-        """A and b of the equations A sizes = b, with which the table's velocity and displacement are zero at the
-        record's end.
+        """A and b of the equations A sizes = b, which make the table's velocity and displacement zero at the end of the
+        record.
         """
         scale = np.array([self._reach.velocity, self._reach.displacement])
         velocity, displacement = self._modes.motions(np.array([self._record.size - 1]))
@@ -287,4 +288,4 @@ class _Problem:
     def _refusal(self, why: str) -> InvalidInput:
         allowed = f"{1e3 * self._reach.displacement:.3g} mm and {self._reach.velocity:.3g} m/s"
         peak = f"peak displacement {1e3 * self._motion.peak_displacement:.3g} mm"
-        return InvalidInput("record", peak, f"{why} within {allowed}: scale its time or its acceleration down")
+        return InvalidInput("record", peak, f"{why} within {allowed}: reduce its time scale or its acceleration")

@@ -48,7 +48,7 @@ class DriveCalibration:
 
     @property
     def points(self) -> list[tuple[float, complex]]:
-        """Frequencies [rad/s], each with its response."""
+        """Pairs of frequency [rad/s] and response [m/s2 per V]."""
         return list(zip(self.omega, self.response, strict=True))
 
 
@@ -64,8 +64,8 @@ class Segment:
 
 
 def sweeps(segments: Sequence[Segment], amplitude: float, omega: float) -> list[Sweep]:
-    """The segments as sweeps, starting from `amplitude` and `omega`; from zero drive, a segment begins at its own
-    frequency.
+    """The segments as sweeps, starting from `amplitude` and `omega`; from zero amplitude, a sweep begins at the
+    frequency of its segment.
     """
     found: list[Sweep] = []
     for segment in segments:
@@ -76,7 +76,7 @@ def sweeps(segments: Sequence[Segment], amplitude: float, omega: float) -> list[
 
 
 def program(segments: Sequence[Segment], phase: float = 0.0) -> SineProgram:
-    """The base motion of the segments, starting from rest."""
+    """Base acceleration along the segments, starting from rest at `phase` [rad]."""
     return SineProgram(sweeps(segments, 0.0, segments[0].omega), phase)
 
 
@@ -99,7 +99,7 @@ class Oscillator:
     def reset(self) -> None:
         """Reset to zero drive; keeps the calibration."""
         self._sweeps: deque[Sweep] = deque()
-        self._into = 0  # number of samples of the first sweep already played
+        self._into = 0  # number of samples already played of the first sweep
         self._amplitude, self._omega, self._phase = 0.0, tau, 0.0
         self._shares = ShareRamp()
 
@@ -123,7 +123,7 @@ class Oscillator:
         self._sweeps.append(sweep)
 
     def trim(self, shares: tuple[complex, ...], blend: float = 1.0, wait: int = 0) -> None:
-        """Change to these `shares` of the fundamental, second harmonic and so on, within `blend` cycles of the present
+        """Change to these `shares` of the fundamental, second harmonic and so on, within `blend` cycles of the current
         frequency, beginning after `wait` samples.
         """
         self._shares.to(shares, round(blend * self._cycle), wait)

@@ -67,7 +67,7 @@ def fitting(present: Envelope, change: Envelope, limits: Limits, margin: float) 
     for name in UNITS:
         base, step = present.series[name], change.series[name]
         limit = float(getattr(limits, name)) / margin
-        # room in the direction of the step; without room, no part of the step is possible
+        # distance to the limit in the direction of the step; where it is zero, no part of the step is possible
         room = limit - np.sign(step) * base
         moving = np.abs(step) > 1e-12 * limit
         fits = float(np.min(room[moving] / np.abs(step[moving]), initial=np.inf))
@@ -105,7 +105,7 @@ class Pass:
 
     @property
     def repeatable(self) -> float:
-        """Root mean square of the error without its floor."""
+        """Relative root mean square of the error without its non-repeatable part, `floor`."""
         return max(self.error**2 - self.floor**2, 0.0) ** 0.5
 
     def __str__(self) -> str:
@@ -130,7 +130,7 @@ class SpectrumCheck:
         self._target_spectrum = self._spectrum(target)
 
     def error(self, achieved: Array) -> float:
-        """Largest relative deviation of the response spectrum."""
+        """Largest relative deviation of the response spectrum of `achieved` from that of the target."""
         return float(np.abs(self._spectrum(achieved) / self._target_spectrum - 1.0).max())
 
     def clear_error(self, achieved: Array, frequency: Array, noise: Array) -> tuple[float, float]:

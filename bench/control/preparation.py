@@ -21,8 +21,8 @@ ROUNDING = 1e-9
 
 
 def scaled(record: SampledRecord, length_ratio: float) -> SampledRecord:
-    """`record` for a model with lambda_L = `length_ratio`: the accelerations are unchanged, the step is multiplied by
-    lambda_L^(1/2).
+    """`record` for a model of length scale lambda_L = `length_ratio` (model over prototype): the accelerations are
+    unchanged, and the time step is multiplied by lambda_L^(1/2).
 
     Raises InvalidInput unless the ratio is positive.
     """
@@ -51,7 +51,7 @@ def resampled(record: SampledRecord, dt: float) -> SampledRecord:
 
 
 TRIM = 0.0005
-"""Largest fraction of the Arias intensity that may be trimmed at each end of a record."""
+"""Default fraction of the Arias intensity that is trimmed at each end of a record."""
 
 TAPER = 0.5
 """Duration [s] of the half-cosine taper of a trimmed record, outside the part that is kept."""
@@ -67,10 +67,10 @@ class PreparedMotion:
     """A motion of the table with its derivation from a record.
 
     `record` begins at `begin` [s] on the original record's clock; before that time the table is at rest. All
-    accelerations were multiplied by `factor`. `peak_before` and `peak` are the largest accelerations [m/s2] of the
-    original record and of the motion; `motion` has the table's velocity and displacement. `band` [Hz] is None if the
-    record was not filtered, `reach` and `fit` are None if no stroke was given; `steps` describes the processing steps
-    in order.
+    accelerations were multiplied by `factor`. `peak_before` and `peak` are the largest magnitudes of acceleration
+    [m/s2] of the original record and of the motion; `motion` has the table's velocity and displacement. `band` [Hz] is
+    None if the record was not filtered, `reach` and `fit` are None if no stroke was given; `steps` describes the
+    processing steps in order.
     """
 
     record: SampledRecord
@@ -190,8 +190,8 @@ def _trimmed(record: SampledRecord, share: float) -> _Trimmed:
 
 
 def _filtered(record: SampledRecord, band: tuple[float, float]) -> tuple[SampledRecord, float]:
-    """The band-limited record, and the rest added before it [s]. The upper end of the band may exceed the record's
-    Nyquist frequency.
+    """The band-limited record, and the duration of the rest added before it [s]. The upper end of the band may exceed
+    the record's Nyquist frequency.
     """
     from scipy.fft import next_fast_len
 
@@ -213,7 +213,7 @@ def _filtered(record: SampledRecord, band: tuple[float, float]) -> tuple[Sampled
 
 
 def _factor(record: SampledRecord, peak: float) -> float:
-    """Scale factor for the requested peak."""
+    """Factor that scales the record to the requested `peak` [m/s2]."""
     if not (np.isfinite(peak) and peak > 0.0):
         raise InvalidInput("peak", peak, "it must be a positive acceleration")
     there = float(np.abs(record.acceleration).max())

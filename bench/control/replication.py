@@ -30,7 +30,7 @@ Complex = NDArray[np.complex128]
 Status = Literal["running", "converged", "out of passes", "limited"]
 
 _REFINE_ABOVE, _REFINE_ON_ABOVE = 0.05, 0.01
-"""Error above which the refinement of the response starts, and error down to which it then continues."""
+"""Relative error above which refinement of the response starts, and relative error down to which it continues."""
 _LEAST_SHARE = 0.02
 """No further pass is made if the limits permit less than this fraction of a correction."""
 
@@ -62,9 +62,9 @@ class ReplicationParameters(Parameters):
         "refuse", "", "treatment of a drive beyond a limit: refuse it, or scale it down to fit"
     )
     spectrum_band: tuple[float, float] = quantity(
-        (0.1, 1.0), "s", "periods between which the response spectrum is compared"
+        (0.1, 1.0), "s", "range of periods in which response spectra are compared"
     )
-    spectrum_periods: tuple[float, ...] = quantity((), "s", "additional periods, such as those of the specimen")
+    spectrum_periods: tuple[float, ...] = quantity((), "s", "further periods compared, such as those of the specimen")
 
 
 class Replication:
@@ -236,7 +236,7 @@ class Replication:
             if refused or self._verdict.share < _LEAST_SHARE:
                 self._status = "limited"
             elif np.array_equal(self._drive, self._best):
-                # no line has an error above the non-repeatable part
+                # no spectral line has an error above the non-repeatable part
                 self._status = "converged"
 
     def _next(self) -> tuple[Array, float, Verdict]:
@@ -260,5 +260,5 @@ class Replication:
         return ends
 
     def _size(self, power: Array) -> float:
-        """Square root of the total power of a spectrum, filtered by the window."""
+        """Square root of the total of `power`, shape (n_lines,), filtered by the window."""
         return float(np.sqrt(np.sum(self._table.window**2 * power)))

@@ -1,7 +1,7 @@
 """Stabiliser of an unstable periodic motion: corrections of the drive's fundamental, once per cycle.
 
 The state of the cycle map (`sim.cycle_map`) is estimated by a Kalman filter and fed back by a linear-quadratic
-regulator. The orbit is not an input of the filter: it also estimates the Fourier coefficients y* of the periodic
+regulator. The orbit is not an input of the filter, which also estimates the Fourier coefficients y* of the periodic
 motion, as a random walk with steps that are large compared with the noise. The stabiliser therefore reacts only to
 differences between cycles: any motion that repeats is taken for the orbit and receives no control, however large the
 error of the model.
@@ -36,8 +36,8 @@ deviation saturates the control and fewer motions are captured; with a high cost
 """
 
 READING, DISTURBANCE, WANDER = 3e-6, 1e-3, 1e-2
-"""Standard deviations assumed by the filter: of a measured coefficient [m], of the disturbance of a state in a cycle,
-and of the change of y* in a cycle, both relative to the magnitude of the quantity.
+"""Standard deviations assumed by the filter: of a measured coefficient [m], of the disturbance of a state per cycle,
+relative to the state's scale, and of the change of y* per cycle, relative to the norm of y*.
 """
 
 
@@ -80,8 +80,8 @@ class Stabiliser:
 
     @property
     def deviation(self) -> float:
-        """Norm of the estimated deviation of y from the y of the orbit, relative to the norm of the latter, at the
-        beginning of the next cycle.
+        """Norm of the estimated deviation of y from that of the orbit at the beginning of the next cycle, relative to
+        the norm on the orbit.
         """
         return float(np.linalg.norm(self._map.outputs @ self._state) / np.linalg.norm(self._map.orbit))
 

@@ -26,18 +26,18 @@ from sim.steady import NoOrbit, Orbit, rocking_orbit
 Counts = NDArray[np.float64]
 
 TOPS = (22.0, 24.0, 26.0, 28.0)
-"""Frequencies [rad/s] of the ramp before a downward sweep; at these the block rocks little and the frame is far from
-resonance.
+"""Frequencies [rad/s] at which the ramp before a downward sweep is driven: there the block rocks little, and the frame
+is far from resonance.
 """
 
 RAMPS = ((6.0, 0.0), (12.0, 0.0), (6.0, 10.0))
-"""Durations [s] of this ramp and of the wait between the ramp and the chirp."""
+"""Durations [s] of the ramp before a downward sweep, and of the wait between ramp and sweep."""
 
 CHIRPS = (0.5, 1.0)
-"""Rates of the chirp, the downward frequency sweep [rad/s per s]."""
+"""Rates of the downward frequency sweep, or chirp [rad/s per s]."""
 
 DIRECT_RAMPS = (8.0, 16.0)
-"""Durations of a ramp at the requested frequency [s]."""
+"""Durations [s] of a ramp directly at the requested frequency."""
 
 OVERSHOOTS = (1.0, 1.2)
 """Ratios of the amplitude of ramp and chirp to the requested amplitude; a larger amplitude uplifts a block that would
@@ -45,7 +45,7 @@ stay at rest.
 """
 
 EASE = 6.0
-"""Time within which an overshoot is removed at the requested frequency [s]."""
+"""Time [s] within which the amplitude is reduced from the overshoot at the requested frequency."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class Candidate:
 
     @property
     def duration(self) -> float:
-        """Duration [s]."""
+        """Total duration of the segments [s]."""
         return sum(segment.duration for segment in self.segments)
 
 
@@ -96,8 +96,8 @@ def _candidate(name: str, segments: list[Segment], amplitude: float, overshoot: 
 
 
 DRIVE = 0.03
-"""Relative half width of the distribution of the table's amplitude during a start-up, before amplitude control takes
-effect.
+"""Relative half width of the uniform distribution of the table's amplitude during a start-up, before amplitude control
+takes effect.
 """
 
 SIEVES = ((5, 2.0), (10, 1.0))
@@ -110,7 +110,7 @@ SEED = 1
 """Random seed of the draws, for reproducible results."""
 
 DWELL, WINDOW = 40.0, 4.0
-"""Simulated time at the requested frequency, and duration of its last part, which is evaluated [s]."""
+"""Simulated time [s] at the requested frequency, and duration [s] of its evaluated last part."""
 
 TOLERANCE = 1e-7
 """Relative tolerance of the simulations."""
@@ -137,13 +137,13 @@ class Start:
 
     @property
     def duration(self) -> float:
-        """Duration [s]."""
+        """Total duration of the segments [s]."""
         return sum(segment.duration for segment in self.segments)
 
 
 @dataclass(frozen=True, eq=False)
 class _Case:
-    """A drawn specimen, the drive's relative amplitude, and the specimen's orbit under that drive."""
+    """A drawn specimen, the relative amplitude of the drive, and the orbit of this specimen under this drive."""
 
     specimen: Specimen
     drive: float
@@ -217,7 +217,7 @@ def _best_candidates(
         batch = order[len(simulated) : len(simulated) + max(keep - np.count_nonzero(total[simulated] == most), 1)]
         total[batch] += _successes([ways[i] for i in batch], cases)
         simulated += batch
-    # the sort below is stable: equally good candidates of equal duration keep the given order
+    # the sort below is stable: equally successful candidates of equal duration keep the given order
     simulated.sort()
     best = [simulated[k] for k in _best_first([ways[i] for i in simulated], total[simulated])][:keep]
     return [ways[i] for i in best], total[best]

@@ -18,14 +18,14 @@ ORDER = 2
 """Order n of the Butterworth filter, applied forward and backward: gain 1 / (1 + (f_c / f)^2n), zero phase."""
 
 CORNERS = (0.005, 5.0)
-"""Range of the search for the lowest corner that fits [Hz]."""
+"""Range of corner frequencies [Hz] searched for the lowest that fits the record."""
 
 HALVINGS = 24
-"""Number of bisections of that range on a logarithmic scale: the final interval is a millionth wide."""
+"""Number of bisections of that range on a logarithmic scale; the final relative width is below 1e-6."""
 
 PAD = 1.5
 """Length of the zero padding before and after the record, in which the filter's response decays, in periods of the
-corner per order.
+corner frequency, per order of the filter.
 """
 
 
@@ -39,9 +39,10 @@ class HighPassed:
 
 
 def fit_by_high_pass(acceleration: Array, dt: float, reach: Reach) -> HighPassed:
-    """`acceleration` [m/s2], shape (n,), high-pass filtered with the lowest corner that keeps the table within `reach`.
+    """`acceleration` [m/s2], shape (n,), high-pass filtered with the lowest corner frequency that keeps the table
+    within `reach`.
 
-    Raises InvalidInput if no corner up to 5 Hz does.
+    Raises InvalidInput if no corner frequency up to 5 Hz is sufficient.
     """
     low, high = CORNERS
     found = high_passed(acceleration, dt, high)
@@ -66,7 +67,7 @@ def high_passed(acceleration: Array, dt: float, corner: float) -> HighPassed:
     """
     lead = int(np.ceil(PAD * ORDER / (corner * dt)))
     padded = np.pad(acceleration, lead)
-    # as many zeros again, to prevent wrap-around of the periodic transform
+    # padded to twice the length, to prevent wrap-around of the periodic transform
     length = 2 * padded.size
     frequencies = np.fft.rfftfreq(length, dt)
     gain = np.zeros_like(frequencies)
@@ -82,13 +83,13 @@ SHORTEST = 16
 """Minimum number of samples of a record."""
 
 TURNS = 8
-"""Maximum number of fits within a band; after each, about a tenth of the change remains for the next."""
+"""Maximum number of successive fits within a band; each leaves about a tenth of the change to the next."""
 
 TIGHTER = 0.995
 """Factor by which the reach is reduced from one fit to the next."""
 
 SAME = 0.01
-"""Largest difference between the fitted motion and its band-limited version, as a fraction of the reach."""
+"""Largest accepted deviation of the band-limited displacement from the fitted one, as a fraction of the reach."""
 
 ROUNDING = 1e-9
 """Fraction of the peak velocity or displacement below which a value counts as zero."""
@@ -98,7 +99,7 @@ NOT_BOTH = "band and stroke are incompatible: lower the band's lower end, or sca
 
 
 class Method(StrEnum):
-    """Fit by the smallest change that suffices, or by the high-pass filter with the lowest corner that suffices."""
+    """Method of the fit: the smallest sufficient change, or the high-pass filter with the lowest sufficient corner."""
 
     LEAST_CHANGE = "least-change"
     HIGH_PASS = "high-pass"
@@ -178,9 +179,9 @@ def fit_stroke(
 def _least_change(
     original: Array, dt: float, reach: Reach, periods: Array, damping: float, band: tuple[float, float] | None
 ) -> Array:
-    """The record with the least change. Half sines end with the record and therefore have slight content below their
-    frequency, outside the table's `band`. This content is removed; if the motion then exceeds the reach or does not end
-    at rest, the record is fitted again.
+    """The record with the smallest sufficient change. The half sines end with the record and therefore have slight
+    content below their frequency, outside the table's `band`. This content is removed; if the motion then exceeds the
+    reach or does not end at rest, the record is fitted again.
     """
     if band is None:
         return fit_by_least_change(original, dt, reach, periods, damping)

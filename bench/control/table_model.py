@@ -1,5 +1,5 @@
-"""Identified model of the table: its response to the drive, with uncertainty, and the inverse of the response for
-corrections.
+"""Identified model of the shake table: its response to the drive, with uncertainty, and the inverse of the response for
+corrections of the drive.
 """
 
 import json
@@ -21,7 +21,7 @@ from sim.parameters import Parameters, quantity
 Number = TypeVar("Number", np.float64, np.complex128)
 
 _REACH = exp2(1.0 / 6.0)
-"""Ratio of the highest averaged frequency to the centre frequency: a sixth of an octave on either side."""
+"""Ratio of the ends of an averaging band to its centre frequency: a sixth of an octave on either side."""
 
 
 def octave_mean(values: NDArray[Number], frequency: NDArray[np.float64]) -> NDArray[Number]:
@@ -149,7 +149,9 @@ class TableModel(Parameters):
 Complex = NDArray[np.complex128]
 
 REGULARISATION = 1e-3
-"""eps: a line whose response is below this fraction of the largest receives less than half the required drive."""
+"""eps: a line whose response is below this fraction of the largest receives less than half the drive that an exact
+inverse requires.
+"""
 
 _TINY = 1e-12
 """Fraction of the largest power below which a line contains only rounding errors."""
@@ -190,7 +192,7 @@ class TableInverse:
         return self.record(self._response * self.spectrum(volts))
 
     def correction(self, missing: Complex, noise: Array) -> Array:
-        """Drive [V] for the spectrum of a `missing` acceleration, at unit gain.
+        """Correction of the drive [V], at unit gain, for the spectrum of the `missing` acceleration.
 
         Every line is weighted by its coherence and by the fraction of its power that is not `noise`, so that the drive
         does not reproduce noise.

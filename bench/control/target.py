@@ -16,17 +16,17 @@ ORDER = 4
 """Order of the Butterworth filters, applied forwards and backwards, that limit a record to the band."""
 
 FLAT, REACH = 1.6, 2.0
-"""Factors by which the band is widened at both ends: the weight is 1 up to the first and 0 beyond the second."""
+"""Factors by which the band is widened at both ends: the window is 1 up to the first and 0 beyond the second."""
 
 REST = 4.0
-"""Rest before and after the record, in which the filters settle, in periods of the band's lowest frequency."""
+"""Duration of the rest before and after the record, in which the filters settle, in periods of the band's lower end."""
 
 
 @dataclass(frozen=True)
 class Target:
     """Table acceleration [m/s2] at `sample_rate` [1/s], shape (n,); the rest at each end lasts `rest` samples.
 
-    `band` [Hz] contains the -6 dB points of the filters applied to the motion, whose spectrum is zero outside
+    `band` [Hz] is the pair of -6 dB points of the filters applied to the motion, whose spectrum is zero outside
     `support`.
     """
 
@@ -97,7 +97,7 @@ def band_gain(frequency: Array, band: tuple[float, float]) -> Array:
 
 
 def integrated(acceleration: Array, sample_rate: float) -> tuple[Array, Array]:
-    """Velocity [m/s] and displacement [m], from the first sample on, for an acceleration with its mean removed."""
+    """Velocity [m/s] and displacement [m] for `acceleration` [m/s2] without its mean; both begin at zero."""
     spectrum = np.fft.rfft(acceleration)
     omega = 2.0 * np.pi * np.fft.rfftfreq(acceleration.size, 1.0 / sample_rate)
     spectrum[0], omega[0] = 0.0, 1.0
@@ -132,11 +132,11 @@ class Reach:
     def __post_init__(self) -> None:
         for name, value in (("displacement", self.displacement), ("velocity", self.velocity)):
             if not (isfinite(value) and value > 0.0):
-                raise InvalidInput(name, value, "the limits of the table must be positive numbers")
+                raise InvalidInput(name, value, "it must be a positive number")
 
     @staticmethod
     def of(configuration: BenchConfiguration, share: float = SHARE) -> "Reach":
-        """The fraction `share` of the bench's stroke and limits."""
+        """The fraction `share` of the smaller of half stroke and displacement limit, and of the velocity limit."""
         limits = configuration.limits
         return Reach(share * min(configuration.half_stroke, limits.displacement), share * limits.velocity)
 

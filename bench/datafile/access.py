@@ -19,13 +19,13 @@ if TYPE_CHECKING:
 
 h5f, h5p = cast(Any, h5py.h5f), cast(Any, h5py.h5p)
 
-# The oldest format in which a file can be read while it is being written; fixed, so that older tools can read the files
-# of newer writers.
+# The oldest format in which a file can be read while it is being written. It is fixed, so that older tools can read
+# files of newer writers.
 VERSIONS = ("v110", "v110")
 
 RETRIES = 28
-"""Number of attempts to read metadata of a file that is being written; the pauses between them double from 1 ns and
-last 0.3 s in total.
+"""Number of attempts to read metadata of a file that is being written; the pauses between them double, starting at 1
+ns, and last 0.3 s in total.
 
 With HDF5's default of 100 attempts, reading data that another program has truncated would practically never end, and
 would block the whole process, including the drive.
@@ -33,7 +33,7 @@ would block the whole process, including the drive.
 
 
 def locking(system: str = sys.platform) -> Literal["best-effort"] | bool:
-    """The locking mode of every file, for h5py.
+    """Locking mode with which h5py opens every file.
 
     On Windows locks are mandatory: a reader of a file that is being written would make its writer fail at the next
     flush or at the end, with errno 13. No locks are used there; single-writer mode and creation without replacement
@@ -50,7 +50,7 @@ def open_living(path: Path) -> Any:
 def open_to_write(path: Path) -> Any:
     """Open a new file, which its creator has closed, in single-writer mode to append to its datasets.
 
-    A file switched to this mode while it is open would use HDF5's default number of attempts.
+    Switching an open file to this mode instead would leave HDF5's default number of attempts in effect.
     """
     return _opened(path, h5f.ACC_RDWR | h5f.ACC_SWMR_WRITE)
 
@@ -90,14 +90,14 @@ def is_let_go(path: Path) -> bool:
 
 
 MISSING = b"\xff"
-"""Value returned for every byte beyond the end. A string heap has no checksum, and HDF5 would loop for ever in a heap
-of zeros.
+"""Byte returned for every position beyond the end of the file. A string heap has no checksum, and HDF5 would loop for
+ever in a heap of zeros.
 """
 
 
 class Quiet(io.RawIOBase):
     """A file presented to HDF5 as if its writer had closed it, with the length stated in its superblock; missing bytes
-    are read as MISSING.
+    are read as `MISSING`.
 
     In metadata such bytes fail the checksums. Uncompressed values have no checksums: their readers must first determine
     where they end with `bench.datafile.opening`.

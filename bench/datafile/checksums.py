@@ -61,9 +61,7 @@ class Checksums:
         self._entry, self._stored = entry, hdf5.dataset(entry, f"{GROUP}/values")
 
     def seal(self, grown: Mapping[str, str]) -> None:
-        """Add the missing checksums: those in `grown`, by path, and for the other datasets those computed from the
-        file.
-        """
+        """Add the missing checksums: those in `grown`, by path; those of other datasets are computed from the file."""
         for path, known in self._values.items():
             if not known:
                 self._values[path] = grown.get(path) or of_values(hdf5.dataset(self._entry, path))
@@ -151,7 +149,7 @@ def _plain(value: Any) -> Any:
 
 
 SMALL = 2**20
-"""Size of a dataset that is hashed in a few milliseconds [bytes]."""
+"""Largest size [bytes] of a dataset that is checked by default; hashing it takes a few milliseconds."""
 
 
 @dataclass(frozen=True)
@@ -173,7 +171,7 @@ class Integrity:
         if self.failing:
             return "damaged or changed since it was written: " + "; ".join(self.failing.values())
         left = f"; {len(self.unchecked)} not checked" if self.unchecked else ""
-        return f"{self.compared} datasets are unchanged{left}"
+        return f"unchanged datasets: {self.compared}{left}"
 
 
 def integrity(entry: hdf5.Group, largest: int | None = SMALL, done: Done = lambda _done, _all: None) -> Integrity:

@@ -21,7 +21,7 @@ BYTES_AT_ONCE = 2**22
 
 @dataclass
 class Copying:
-    """A copy of a file of `size` bytes: the first `counted` rows of each part, without the objects at the paths in
+    """Copies a file of `size` bytes: the first `counted` rows of each part, without the objects at the paths in
     `leave`.
 
     `lost` receives the reason for each unreadable path; growing datasets are copied up to the first unreadable row.
@@ -56,10 +56,10 @@ class Copying:
             elif is_within(stored, self.size):
                 copied = target.create_dataset(name, data=stored[()], dtype=stored.dtype)
             else:
-                self.lost[stored.name] = f"{stored.name} lies beyond the end of the file: the file is truncated"
+                self.lost[stored.name] = f"{stored.name} extends beyond the end of the file: the file is truncated"
                 return
         except UNREADABLE as error:
-            # the numbers are meaningless without their attributes
+            # the values are meaningless without their attributes
             self.lost[stored.name] = f"{stored.name} cannot be read ({reason(error)})"
             return
         for each, value in attributes.items():
@@ -77,7 +77,7 @@ class Copying:
             try:
                 values = stored[done : done + count]
             except (OSError, RuntimeError):
-                # halve the step, down to the first unreadable row
+                # halve the step until the first unreadable row is found
                 if count == 1:
                     break
                 step = count // 2
@@ -169,10 +169,10 @@ def cut(entry: hdf5.Group, counted: Mapping[str, int]) -> dict[str, int]:
 def _placed(
     row: NDArray[np.int64], run: NDArray[np.int64], first: NDArray[np.int64], samples: int, *, lost: bool
 ) -> tuple[int, int]:
-    """Numbers of blocks and samples at valid positions.
+    """Numbers of consistent blocks and samples at the beginning of the file.
 
-    At valid positions, rows begin at 0 and ascend, run numbers never decrease, and within a run samples may be missing
-    but not repeated.
+    In consistent blocks, rows begin at 0 and ascend, run numbers never decrease, and within a run samples may be
+    missing but not repeated.
     """
     if not len(row) or row[0] != 0 or run[0] < 1 or first[0] < 0:
         return 0, 0

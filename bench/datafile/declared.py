@@ -104,7 +104,7 @@ def event_tables(kinds: Iterable[object]) -> dict[type[Event], EventTable]:
 EVENT_TABLES: Mapping[type[Event], EventTable] = event_tables(
     kind for module in (events, live_values, findings) for kind in vars(module).values()
 )
-"""Tables of events that every file has; the tables of a protocol's events follow them."""
+"""Tables of the events of all protocols, which every file has; the tables of a protocol's own events follow them."""
 
 ENTRY_TABLES: Mapping[type[Event], EventTable] = {
     kind: table for kind, table in EVENT_TABLES.items() if kind.journalled and table.single
@@ -112,7 +112,7 @@ ENTRY_TABLES: Mapping[type[Event], EventTable] = {
 """Tables with exactly one row for each journal entry of their kind."""
 
 ENTRY_PATHS = {**{kind.__name__: table.path for kind, table in ENTRY_TABLES.items()}, "PassFinished": "passes"}
-"""Tables of journal entries in the files of earlier versions, which do not name the tables."""
+"""Tables of journal entries, by event name, in files of earlier versions, which do not name the tables."""
 
 TABLES: Mapping[str, tuple[Field, ...]] = {
     "instrument/blocks": BLOCKS,

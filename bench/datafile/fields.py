@@ -24,7 +24,7 @@ ROWS_PER_PACKED_CHUNK = 4096
 
 
 class Kind(StrEnum):
-    """Kind of a field's values."""
+    """Kind of a field's values: real numbers, integers, switches or strings."""
 
     REAL = "real"
     WHOLE = "whole"

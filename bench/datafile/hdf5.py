@@ -37,14 +37,15 @@ from bench.datafile.hdf5_reading import read_text as read_text
 from bench.datafile.hdf5_reading import read_texts as read_texts
 
 PAGE = 1024
-# Filters available in every HDF5 library, so that MATLAB and web viewers can read the file; measured in decision 10.
+# Filters available in every HDF5 library, so that MATLAB and web viewers can read the file; measured in docs/decisions,
+# no. 10.
 FILTERS: dict[str, Any] = {"shuffle": True, "compression": "gzip", "compression_opts": 1}
 
 
 def create(path: Path) -> File:
     """Create a new file; raises FileExistsError if it exists."""
     # metadata are written in pages of disk-sector size, so that a power failure cannot leave an item half written
-    # (measured in decision 10)
+    # (measured in docs/decisions, no. 10)
     return cast(File, h5py.File(path, "x", libver=VERSIONS, locking=locking(), fs_strategy="page", fs_page_size=PAGE))
 
 
@@ -119,7 +120,7 @@ def view(parent: Group, name: str, source: Dataset, part: slice) -> Dataset:
 
 
 def write_numbers(parent: Group, name: str, values: object, *, unit: str, description: str) -> Dataset:
-    """Create a dataset with all its numbers; a scalar dataset if `values` is a scalar."""
+    """Create a dataset of the numbers `values`; a scalar dataset if `values` is a scalar."""
     made = parent.create_dataset(name, data=np.asarray(values))
     describe(made, units=unit, description=description)
     return made
@@ -162,11 +163,11 @@ def write_text(parent: Group, name: str, text: str, *, width: int = 0, descripti
 
 
 MANY = 50_000
-"""Number of strings of an array that are written at once."""
+"""Maximum number of strings of an array that are written at once."""
 
 
 def write_texts(parent: Group, name: str, texts: Iterable[str], *, description: str) -> Dataset:
-    """Create a dataset with all its strings."""
+    """Create a dataset of the strings `texts`."""
     stored = [text.encode() for text in texts]
     kind = text_type(max([1, *map(len, stored)]))
     made = parent.create_dataset(name, data=np.array(stored, dtype=kind), dtype=kind)
@@ -200,12 +201,12 @@ def clip_text(text: str, width: int) -> bytes:
 
 
 def replace_text(target: Dataset, text: str, width: int) -> None:
-    """Replace the string in a scalar of `width` bytes; truncates it if necessary."""
+    """Replace the string in a scalar of `width` bytes; a longer `text` is truncated."""
     target[()] = np.array(clip_text(text, width), dtype=text_type(width))
 
 
 def append(target: Dataset, values: NDArray[Any]) -> None:
-    """Add rows at the end."""
+    """Append `values` as rows."""
     start = target.shape[0]
     target.resize((start + len(values),))
     target[start:] = values

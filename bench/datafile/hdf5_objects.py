@@ -1,7 +1,6 @@
 # pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
 # pyright: reportUnknownArgumentType=false
-"""Access to members and attributes through h5py's low-level interface, in a third of the time that its dictionaries
-take.
+"""Access to members and attributes through h5py's low-level interface, in a third of the time of its dictionaries.
 
 A file has some 200 objects and 600 attributes, which are created before a run starts and read whenever it is opened.
 """

@@ -76,7 +76,7 @@ class File(Group, Protocol):
 
 
 class DataFileError(RockbenchError):
-    """Error: the file could not be written or read; complete data written earlier stay readable."""
+    """Error raised if a file cannot be written or read; complete data written earlier remain readable."""
 
     error_code = "data_file"
 

@@ -8,7 +8,7 @@ from bench.datafile.hdf5_reading import UNREADABLE, DataFileError, reason
 from bench.datafile.opening import open_file
 
 MEMBERS = ("status", "summary", "start_time", "metadata")
-"""Members of /entry that are read."""
+"""Members of /entry that are read for the heading."""
 
 
 @dataclass(frozen=True)

@@ -74,7 +74,7 @@ def wait_until_free(touch: Callable[[], None], held: float | None = None) -> Non
             if not is_held(error):
                 raise
             if time.monotonic() >= end:
-                raise DataFileError(f"{in_use(error)} and has held it for {patience:g} s") from error
+                raise DataFileError(f"{in_use(error)}; it remained locked for {patience:g} s") from error
         time.sleep(PAUSE)
 
 
@@ -150,7 +150,7 @@ class FileSync:
         if not os.fstat(self._handle).st_nlink:
             return "deleted it"
         with suppress(OSError):
-            # on Linux the present name of an open file can be queried
+            # on Linux the current name of an open file can be queried
             return f"renamed it to {Path(os.readlink(f'/proc/self/fd/{self._handle}')).name}"
         return "renamed or deleted it"
 

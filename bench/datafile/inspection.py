@@ -28,7 +28,7 @@ def file_hash(path: Path) -> str:
 
 
 def analysis_overview(file: hdf5.File, path: Path) -> dict[str, Any]:
-    """The contents of a re-analysis file as JSON content."""
+    """Overview of a re-analysis file as JSON content."""
     entry = hdf5.group(file, "entry")
     source, process = hdf5.group(entry, "original"), hdf5.group(entry, "process")
     points = hdf5.group(entry, "points")
@@ -54,7 +54,7 @@ def analysis_problems(file: hdf5.File, path: Path) -> Iterator[str]:
         yield "the file has no checksums because an older version wrote it; repeat the analysis to write a new file"
     source = hdf5.group(entry, "original")
     if _original(source, path) == "changed":
-        yield f"the file of its campaign, {hdf5.read_text(source, 'file')}, is not the file that was analysed"
+        yield f"the campaign file {hdf5.read_text(source, 'file')} is not the file that was analysed"
 
 
 def _original(source: hdf5.Group, path: Path) -> str:
@@ -165,7 +165,7 @@ def _of_record(record: DataFile, size: int) -> Iterator[str]:
             "writes a clean file"
         )
     if not record.channels:
-        yield "the file has no channel"
+        yield "the file contains no channels"
     entry = hdf5.group(record.file, "entry")
     if record.format_version > 1 and GROUP not in entry:
         yield "the checksums are missing"
@@ -187,11 +187,11 @@ def _of_layout(stored: hdf5.Dataset, counted: Mapping[str, int], size: int, *, c
         yield f"{path} has no units"
     if not hdf5.grows(stored):
         if not is_within(stored, size):
-            yield f"{path} lies beyond the end of the file: it is truncated"
+            yield f"{path} extends beyond the end of the file: it is truncated"
         return
     length, rows = stored.shape[0], counted[part_of(path, counted)]
     # in a file that was not closed, rows beyond the count are incomplete
     if length < rows or (closed and length > rows):
-        yield f"{path} has {length} rows, but {rows} were written"
+        yield f"number of rows of {path}: {length}; number written: {rows}"
     if (there := intact_rows(stored, size)) < min(length, rows):
         yield f"the file has only {there} of the {rows} rows of {path}: it is truncated or damaged"

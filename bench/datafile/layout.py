@@ -35,7 +35,7 @@ STATUS_WIDTH, TIME_WIDTH, SUMMARY_WIDTH = 16, 40, 4096
 
 
 class Status(StrEnum):
-    """Status of the campaign."""
+    """Status of a campaign in its file; only a recovery sets "interrupted"."""
 
     RUNNING = "running"
     COMPLETED = "completed"
@@ -146,7 +146,7 @@ def build(file: hdf5.File, skeleton: Skeleton) -> Parts:
 def create_ends(
     entry: hdf5.Group, counted: Sequence[str]
 ) -> tuple[hdf5.Dataset, hdf5.Dataset, hdf5.Dataset, hdf5.Dataset]:
-    """Create `complete`, which counts the rows of `counted`, `status`, `summary` and `end_time` with initial values."""
+    """Create `complete`, the row counts of `counted`, and `status`, `summary` and `end_time`, with initial values."""
     complete = hdf5.write_numbers(
         entry, "complete", np.zeros(len(counted), dtype=np.int64), unit="1", description="complete rows of each part"
     )

@@ -31,13 +31,13 @@ def intact_rows(stored: hdf5.Dataset, size: int) -> int:
 
 
 def is_within(stored: hdf5.Dataset, size: int) -> bool:
-    """Whether a fixed dataset lies entirely within the first `size` bytes of the file."""
+    """Whether a fixed dataset is stored entirely within the first `size` bytes of the file."""
     place = hdf5.place(stored)
     return place is None or place[0] + place[1] <= size
 
 
 def check_whole(entry: hdf5.Group, counted: Mapping[str, int], size: int) -> None:
-    """Read all metadata, and check that the rows counted as complete lie within the file.
+    """Read all metadata, and check that the rows counted as complete are within the file.
 
     Raises HDF5's exceptions for damage, and DataFileError for rows beyond `size` bytes.
     """
@@ -56,7 +56,7 @@ def check_whole(entry: hdf5.Group, counted: Mapping[str, int], size: int) -> Non
 
 
 FORMAT, FORMAT_VERSION = "rocking-bench record", 2
-"""Format of a campaign file."""
+"""Name and version of the format of a campaign file."""
 
 WORDING = 8
 """Version of the sentences in journal and results. Replay compares these sentences only with those of a file of the
@@ -69,7 +69,7 @@ version.
 """
 
 ANALYSIS, ANALYSIS_VERSION = "rocking-bench analysis", 1
-"""Format of a re-analysis file, stored next to the campaign file."""
+"""Name and version of the format of a re-analysis file, stored in the folder of the campaign file."""
 
 _VERSIONS = {FORMAT: FORMAT_VERSION, ANALYSIS: ANALYSIS_VERSION}
 _ATTEMPTS, _PAUSE = 3, 0.1
@@ -81,8 +81,8 @@ _HINT = "`rockbench file recover` restores the readable part"
 def open_file(
     path: Path, *, judging: bool = False, kinds: tuple[str, ...] = (FORMAT,), only: Sequence[str] = ()
 ) -> hdf5.File:
-    """Open a file of one of the `kinds`; see `bench.datafile.reader.open_datafile`. The caller reads `only` these
-    members of /entry, which alone are then checked.
+    """Open a file of one of the `kinds`; see `bench.datafile.reader.open_datafile`. `only` names the members of
+    /entry that the caller reads, so that only these are checked; by default, all are.
     """
     if path.is_dir():
         raise InvalidInput("record", str(path), "it is a directory; specify a file in it")

@@ -58,7 +58,7 @@ def open_datafile(path: Path, *, judging: bool = False) -> "DataFile":
 
 
 class DataFile(SampleReader):
-    """An open data file. Everything is read on access; `refresh` includes the rows that a writer has added since."""
+    """An open data file. Its contents are read on access; `refresh` includes the rows that a writer has added since."""
 
     def __init__(self, file: hdf5.File) -> None:
         super().__init__(hdf5.group(file, "entry"))
@@ -88,7 +88,7 @@ class DataFile(SampleReader):
                 hdf5.dataset(self._entry, path).refresh()
 
     def _check_size(self) -> None:
-        # HDF5 would search for the truncated data, for hours
+        # otherwise HDF5 would search for the truncated data for hours
         with reading(str(self._file.filename)):
             size = Path(self._file.filename).stat().st_size
         if size < self._size:
@@ -119,14 +119,14 @@ class DataFile(SampleReader):
 
     @property
     def recoveries(self) -> list[str]:
-        """Notes on the recovery from another file, one line each; usually there are none."""
+        """Notes on the recovery of this file from a damaged one, one line each; empty if it was not recovered."""
         if not hdf5.has(self._entry, "recovery/description"):
             return []
         return hdf5.read_text(self._entry, "recovery/description").splitlines()
 
     @property
     def checksums(self) -> dict[str, tuple[str, str]]:
-        """SHA-256 of values and attributes by dataset; that of the values is empty if the file was not closed."""
+        """SHA-256 of values and attributes by dataset; that of growing values is empty if the file was not closed."""
         return checksums.read(self._entry) if hdf5.has(self._entry, checksums.GROUP) else {}
 
     def integrity(self, largest: int | None = SMALL, done: Done = lambda _done, _all: None) -> Integrity:
@@ -179,7 +179,7 @@ class DataFile(SampleReader):
 
     @property
     def events(self) -> list[JournalEntry]:
-        """The journal."""
+        """The entries of the journal."""
         return [JournalEntry(**row) for row in self._rows("events")]
 
     @property

@@ -1,4 +1,4 @@
-"""Provenance of a report's numbers: file, people, software, parameters, bench, clocks."""
+"""Provenance of a report's numbers: data file, operator, software, parameters, bench and sensor clocks."""
 
 from collections.abc import Iterator, Mapping
 from datetime import UTC, datetime
@@ -15,19 +15,19 @@ from sim.parameters import Parameters
 NAME = "rocking-bench"
 
 SHORT = 10
-"""Number of digits of the git hash below the title; the section has the full hash."""
+"""Number of digits of the git hash in the line below the title; the section on provenance gives the full hash."""
 
 UNKNOWN = "unknown"
 
 EXACT = 10
-"""Number of significant digits of a parameter, enough to reproduce it as typed."""
+"""Number of significant digits of a printed parameter, enough to reproduce the number as it was typed."""
 
-_DEVICES = {"backend": "kind of bench", "seed": "seed of the random numbers"}
-"""Entries of a bench description that are not devices."""
+_DEVICES = {"backend": "kind of bench", "seed": "random seed"}
+"""Labels of those entries of a bench description that are not devices."""
 
 
 def provenance_section(campaign: Campaign) -> Section:
-    """Report section on file, hash, times, people, versions, bench and parameters."""
+    """Report section on the data file, its hash, operator, software versions, parameters, bench and sensor clocks."""
     parts: list[Part] = [
         facts_table("Provenance of the numbers in this report", {**_file(campaign), **_made_with(campaign)}),
         parameters_table("Parameters of the protocol", campaign.parameters_type, campaign.parameters),
@@ -40,25 +40,25 @@ def provenance_section(campaign: Campaign) -> Section:
 
 
 def provenance_line() -> str:
-    """The line below the title: date and program of the report, definition of its gains."""
+    """Line below the title: date of the report, program that created it, and definitions of the gains α₂ and α₁."""
     maker = program(software()[NAME], revision(), SHORT)
     units = (
         "α₂ is the ratio of the peak drift of the coupled frame to that of the bare frame, α₁ the same ratio of the "
-        "peaks of u₁ (Eq. 10)."
+        "peaks of u₁ (Eq. 10 of the paper)."
     )
     return f"Report created on {moment(datetime.now(UTC).isoformat())} by {maker}. {units}"
 
 
 def program(version: str, git: str, digits: int = 40) -> str:
-    """The program's version with `digits` digits of its git hash; a "+" at the end of `git` means that files were
-    changed since the commit.
+    """Name and version of the program with the first `digits` digits of the git hash. A "+" at the end of `git` means
+    that files were changed since that commit.
     """
     changed = ", files changed since" if git.endswith("+") else ""
     return f"{NAME} {version}, git {git.removesuffix('+')[:digits]}{changed}"
 
 
 def libraries(versions: Mapping[str, str]) -> str:
-    """Versions of the libraries that affect the results."""
+    """Names and versions of the libraries that affect the results."""
     return ", ".join(f"{name} {version}" for name, version in versions.items() if name != NAME)
 
 
@@ -74,9 +74,9 @@ def _file(campaign: Campaign) -> dict[str, str]:
         "operator": metadata.get("operator") or "not stated",
         "notes": metadata.get("notes") or "none",
         "started": moment(record.start_time),
-        "ended": moment(record.end_time) or "none: the file is being written, or its writer was killed",
+        "ended": moment(record.end_time) or "not stated: the file is still being written, or its writer was killed",
         "status": typeset(": ".join(filter(None, (record.status, record.summary)))),
-        "samples": f"{record.rows} of each channel at {record.sample_rate:g} samples/s",
+        "samples": f"{record.rows} per channel at {record.sample_rate:g} samples/s",
     }
     if record.recoveries:
         facts["recovered"] = "; ".join(record.recoveries)
@@ -123,18 +123,18 @@ def _clocks(campaign: Campaign) -> list[Part]:
         Column("values"),
         Column("lost"),
     ]
-    return [Table("Alignment of sensors with their own clocks to the sample clock", columns, rows)] if rows else []
+    return [Table("Sensors with their own clocks: alignment to the sample clock", columns, rows)] if rows else []
 
 
 def facts_table(caption: str, facts: Mapping[str, str]) -> Table:
-    """Table of names and texts."""
+    """Table with a row for each fact: item and value."""
     rows = [[name, value] for name, value in facts.items()]
     return Table(caption, [Column("item", words=True), Column("value", words=True)], rows)
 
 
 def parameters_table(caption: str, kind: type[Parameters] | None, values: Mapping[str, Any]) -> Table:
-    """Parameters with description, name, value and unit. Parameters that this version does not declare follow, by name
-    only.
+    """Table of parameters with description, name, value and unit. Parameters that this version does not declare come
+    last, with name and value only.
     """
     rows = list(_declared_rows(kind, values, "")) if kind is not None else []
     known = {row[1] for row in rows}
@@ -149,7 +149,7 @@ def parameters_table(caption: str, kind: type[Parameters] | None, values: Mappin
 
 
 def flat(values: Mapping[str, Any]) -> dict[str, str]:
-    """Nested values as strings, with names joined by dots."""
+    """Nested values as a flat mapping of strings; the names of the levels are joined by dots."""
     found: dict[str, str] = {}
     for name, value in values.items():
         if isinstance(value, dict):

@@ -1,4 +1,4 @@
-"""Figures and tables of earthquake records and of the predictions under them."""
+"""Figures and tables of earthquake records and of the specimen's predicted response to them."""
 
 from collections.abc import Iterator, Sequence
 
@@ -20,14 +20,14 @@ TOGETHER = 3
 """Maximum number of records in a figure."""
 
 SHORTEST, LONGEST = 0.05, 5.0
-"""Periods of the response spectrum [s]."""
+"""Shortest and longest period of the response spectrum [s]."""
 
 STEP = 0.01
 """Time step of a drawn history [s]."""
 
 
 def record_pictures(records: Sequence[Accelerogram]) -> Iterator[Picture]:
-    """Figures of histories and response spectra."""
+    """Figures of the histories and response spectra of the records, up to `TOGETHER` records in each."""
     periods = logarithmic_periods(SHORTEST, LONGEST, per_octave=12)
     for first in range(0, len(records), TOGETHER):
         some = records[first : first + TOGETHER]
@@ -46,7 +46,7 @@ def record_pictures(records: Sequence[Accelerogram]) -> Iterator[Picture]:
 
 
 def gains_picture(curves: Sequence[SeismicCurve], words: str) -> Picture:
-    """Figure of alpha_2 and alpha_1 against stiffness; `words` describes the band of the records."""
+    """Figure of alpha_2 and alpha_1 against the stiffness ratio, by record; `words` describes their frequency band."""
 
     def known(gains: Sequence[float | None]) -> NDArray[np.float64]:
         return np.array([np.nan if gain is None else gain for gain in gains])
@@ -65,13 +65,13 @@ def gains_picture(curves: Sequence[SeismicCurve], words: str) -> Picture:
     limits = "none, whole records" if band is None else f"{band[0]:g} to {band[1]:g} Hz"
     return Picture(
         seismic_figure(drawn, limits),
-        f"Gains against the stiffness ratio, records {words} (predicted). Crosses at the bottom: the block topples.",
+        f"Gains against the stiffness ratio, records {words} (predicted). A cross at the bottom: the block topples.",
         "Curves of alpha 2 and alpha 1 against the stiffness ratio, one for each record.",
     )
 
 
 def motions_table(curves: Sequence[SeismicCurve]) -> Table:
-    """Text table of the shake table's motion and the gains under every record."""
+    """Results by record: the table's motion, the range of alpha_2, and the share of stiffness ratios with toppling."""
     columns = [
         Column("record", words=True),
         Column("band", "Hz", words=True),
@@ -100,12 +100,12 @@ def motions_table(curves: Sequence[SeismicCurve]) -> Table:
             ]
         )
     return Table(
-        "Table motions and their gains; topples: fraction of stiffnesses at which the block topples", columns, rows
+        "Table motions and their gains; topples: share of stiffness ratios at which the block topples", columns, rows
     )
 
 
 def drift_picture(specimen: Specimen, curves: Sequence[SeismicCurve], beta: float) -> Picture:
-    """Figure of the drift of the bare and of the coupled frame under every record."""
+    """Figure of the predicted drift of the bare and of the coupled frame under each record."""
     drawn: list[ModelDrift] = []
     for curve in curves:
         record = curve.prepared.record

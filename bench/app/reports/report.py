@@ -30,11 +30,11 @@ from bench.protocol import Protocol
 from sim.loading import load_model
 
 MOST_CELLS = 60
-"""Maximum number of listed rows."""
+"""Maximum number of rows in the table of results."""
 
 
 def points_section(campaign: Campaign) -> Section | None:
-    """Report section with a row for each result; None if there are no results."""
+    """Report section with a table of the first `MOST_CELLS` results; None if there are no results."""
     results = campaign.record.results
     if not campaign.points:
         return None
@@ -45,7 +45,7 @@ def points_section(campaign: Campaign) -> Section | None:
     rows = [[_cell(each, row) for each in results.values()] for row in range(min(len(campaign.points), MOST_CELLS))]
     parts: list[Part] = [Table(f"Results of the protocol {campaign.protocol}", columns, rows)]
     if len(campaign.points) > MOST_CELLS:
-        parts.append(f"The file contains {len(campaign.points) - MOST_CELLS} more results.")
+        parts.append(f"Further results in the file: {len(campaign.points) - MOST_CELLS}.")
     meanings = [f"{_heading(name, each.unit)}: {first_words(each.description)}" for name, each in results.items()]
     return Section("points", "Results", [*parts, Listing(meanings)])
 
@@ -81,7 +81,7 @@ def fits_section(campaign: Campaign) -> Section | None:
             Picture(
                 fit_figure(fit),
                 f"Fit {typeset(fit.name)}. {meanings}.",
-                "Measured and fitted values against the axis of the fit.",
+                "Measured and fitted values against the independent variable of the fit.",
             )
         )
     return Section("fits", "Fitted models", parts)
@@ -101,7 +101,7 @@ def _words(name: str) -> str:
 
 
 def damage_notice(campaign: Campaign) -> list[Notice]:
-    """The first notice of a report, on datasets that do not match their checksum or have none."""
+    """Notice at the top of a report on datasets that do not match their checksum or have none; empty if all match."""
     found = campaign.integrity
     if found.failing:
         what = counted(
@@ -114,17 +114,19 @@ def damage_notice(campaign: Campaign) -> list[Notice]:
         return [Notice(text)]
     if found.unchecked:
         lacking = counted(len(found.unchecked), "dataset of the file has", "datasets of the file have")
-        return [Notice(f"{lacking} no checksum to verify.")]
+        return [Notice(f"{lacking} no checksum and cannot be verified.")]
     return []
 
 
 USUAL_BETAS = (0.25, 0.64, 0.97)
 MOST_MODES = 4
-"""Maximum number of stiffnesses with drawn modes."""
+"""Maximum number of stiffness ratios whose modes are drawn."""
 
 
 def campaign_report(campaign: Campaign, protocol: Protocol[Any] | None = None, progress: Progress = silent) -> Document:
-    """The complete report. Raises InvalidInput for a file without a usable specimen."""
+    """The complete report; without `protocol`, only the sections common to all campaigns. Raises InvalidInput for a
+    file without a usable specimen.
+    """
     load_model(progress)
     makers: list[Callable[[], Sequence[Section | None]]] = [
         lambda: _results(campaign, protocol),
@@ -145,7 +147,7 @@ def campaign_report(campaign: Campaign, protocol: Protocol[Any] | None = None, p
 
 
 def _results(campaign: Campaign, protocol: Protocol[Any] | None) -> list[Section | None]:
-    """The protocol's sections; if they contain no table, followed by the points field by field."""
+    """The protocol's sections, followed by the table of results if they contain no table."""
     own: Sequence[Section] = [] if protocol is None or protocol.report is None else protocol.report(campaign)
     tabulated = any(isinstance(part, Table) for section in own for part in section.parts)
     return [*own, None if tabulated else points_section(campaign)]

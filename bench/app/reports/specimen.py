@@ -26,7 +26,7 @@ SYMBOLS = {
     "rho": "ρ",
     "restitution_factor": "r/rₜₕ",
 }
-"""Symbols of parameters that differ from their names."""
+"""Printed symbols of the parameters whose symbols differ from their names."""
 
 _SHOWN = 5e-3
 """Correlation coefficients below this magnitude are printed as 0."""
@@ -52,7 +52,7 @@ def specimen_section(
 
 
 def identified_section(campaign: Campaign) -> Section | None:
-    """Report section on findings and correlations; None if there are no findings."""
+    """Report section on the identified properties and their correlations; None if nothing was identified."""
     identified = campaign.record.identified
     if identified is None:
         return None
@@ -162,13 +162,13 @@ def _parameters(specimen: Specimen, uncertainty: SpecimenUncertainty | None, mea
 
 
 def finding_label(name: str) -> str:
-    """Symbol of the quantity of a finding."""
+    """Printed symbol of the identified quantity `name`."""
     label = spring_label(name)
     return SYMBOLS.get(name, name) if label is None else f"k_C, spring of β = {label:g}"
 
 
 def findings_table(identified: Identified, title: str = "Identified properties of the specimen") -> Table:
-    """Table of findings with their expanded uncertainties and sources."""
+    """Table of the identified properties with expanded uncertainties (k = 2), sources and dates."""
     columns = [
         Column("quantity", words=True),
         Column("measured"),
@@ -189,7 +189,7 @@ def _derived(specimen: Specimen) -> Table:
     first, second = frame.natural_frequencies
     c1, c2 = frame.dashpots
     values = [
-        ("ω₁, ω₂", "circular frequencies of the bare frame", f"{plain(first, 6)}, {plain(second, 6)}", "rad/s"),
+        ("ω₁, ω₂", "natural circular frequencies of the bare frame", f"{plain(first, 6)}, {plain(second, 6)}", "rad/s"),
         ("c₁, c₂", "dashpot coefficients for the modal damping ratios", f"{plain(c1, 6)}, {plain(c2, 6)}", "N s/m"),
         ("M", "mass of the block", plain(block.mass, 5), "kg"),
         ("J", "moment of inertia of the block about a base corner", plain(block.inertia, 6), "kg m²"),

@@ -1,6 +1,6 @@
-"""Keeps the computer awake during a run in real time: sleep would interrupt the run with the drive at its last value.
+"""Inhibition of the computer's sleep during a run in real time: sleep would leave the drive at its last value.
 
-A program cannot inhibit the suspension of USB devices; `rockbench doctor` checks the settings for it.
+A program cannot inhibit the suspension of USB devices; `rockbench doctor` checks the computer's settings for it.
 """
 
 import os
@@ -12,9 +12,9 @@ from contextlib import contextmanager, suppress
 from sim import waiting
 
 CONTINUOUS, SYSTEM_REQUIRED = 0x80000000, 0x00000001
-"""Flags of SetThreadExecutionState: valid until changed, and no sleep."""
+"""Flags of SetThreadExecutionState: the state remains in effect until changed; the system must not sleep."""
 ENDING = 1.0
-"""Longest wait for the end of the inhibiting program [s]."""
+"""Longest wait for the inhibiting program to end [s]."""
 
 COMMANDS = {
     "linux": (
@@ -23,7 +23,7 @@ COMMANDS = {
     ),
     "darwin": ("caffeinate", "-i", "-w", str(os.getpid())),
 }
-"""Programs that keep the computer awake until their standard input or this process ends."""
+"""Commands that keep the computer awake until their standard input is closed (Linux) or this process ends (macOS)."""
 
 
 @contextmanager
@@ -59,7 +59,9 @@ def awake(system: str = sys.platform) -> Generator[bool]:
 
 @contextmanager
 def _thread_required(set_state: Callable[[int], int]) -> Generator[bool]:
-    """Context manager in which this thread requires a running system; `set_state` returns 0 when it fails."""
+    """Context manager that keeps Windows awake by `set_state`, which returns 0 if it fails; yields whether it
+    succeeded.
+    """
     required = set_state(CONTINUOUS | SYSTEM_REQUIRED) != 0
     try:
         yield required

@@ -1,4 +1,4 @@
-"""Collection of a fault report from a data file: log, configuration, versions and the latest data in one archive."""
+"""Fault report from a data file: journal, summary, configuration, versions and the latest data in one archive."""
 
 import io
 import json
@@ -20,7 +20,7 @@ from bench.unfinished import write_new
 LAST = 60.0
 """Duration of the data taken from the end of the file [s]."""
 PERSONAL = ("operator", "notes", "file", "journal")
-"""Keys whose values contain names of people or paths."""
+"""Keys whose values may contain names of people or paths."""
 REMOVED = "(removed)"
 _PATH = re.compile(r"(?:[A-Za-z]:\\|\\\\|/)[^\s\"',;:*?<>|]+")
 

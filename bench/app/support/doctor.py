@@ -1,4 +1,4 @@
-"""Checks of the computer on which a bench is to run, each with a remedy."""
+"""Checks of the computer that runs a bench; every fault found is reported with a remedy."""
 
 import importlib.util
 import os
@@ -18,19 +18,19 @@ from bench.provenance import software
 
 OLDEST = (3, 11)
 RESOLUTION = 1e-4
-"""Coarsest acceptable step of the computer's clock [s]."""
+"""Largest acceptable step of the computer's clock [s]."""
 LATE = 0.005
 """Largest acceptable delay of a sleep of 1 ms [s]; it must be short compared with a default block of samples."""
 SPEED = 20e6
-"""Minimum write speed of the disk [B/s]: many times that required by a run."""
+"""Minimum write speed of the disk [B/s], many times the data rate of a run."""
 ROOM = 5e9
 """Free space required for a day of runs [B]."""
 LATENCY = 1
-"""Required latency timer of a serial adapter [ms]; the default of 16 ms delays the values of a laser."""
+"""Largest acceptable latency timer of a serial adapter [ms]; the default of 16 ms delays the readings of a laser."""
 
 
 class Health(StrEnum):
-    """Result of a check."""
+    """Result of a check of the computer."""
 
     GOOD = "good"
     NOTICE = "notice"
@@ -74,7 +74,7 @@ def examine(folder: Path, port: str | None = None) -> Iterator[Finding]:
 
 
 def versions() -> Finding:
-    """Check Python and the libraries."""
+    """Check the version of Python, which must have 64 bits; the finding also lists the versions of the libraries."""
     versions = ", ".join(f"{name} {version}" for name, version in software().items())
     good = sys.version_info[:2] >= OLDEST and sys.maxsize > 2**32
     remedy = "" if good else f"install a 64-bit Python, {OLDEST[0]}.{OLDEST[1]} or newer"
@@ -128,7 +128,7 @@ def disk_speed(folder: Path) -> Finding:
 
 
 def power(governor: Path = Path("/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor")) -> Finding:
-    """Check whether the processor is throttled to save power."""
+    """Check whether the processor's frequency governor saves power; unknown on systems other than Linux."""
     item = "power settings"
     if not governor.is_file():
         return Finding(item, Health.UNKNOWN, "not determined", "switch off sleep and USB suspend during runs")
@@ -151,27 +151,27 @@ def sleep(which: Callable[[str], str | None] = shutil.which, system: str = sys.p
 
 
 def usb_suspend(devices: Path = Path("/sys/bus/usb/devices"), system: str = sys.platform) -> Finding:
-    """Check whether USB devices are suspended when idle: NI's devices, and serial adapters."""
+    """Check whether NI's USB devices and serial adapters can be suspended when idle."""
     item = "USB suspend"
     if system == "win32":
         return _windows_usb_suspend(_answer("powercfg", "/query", "SCHEME_CURRENT", "SUB_USB", _SELECTIVE))
     suspended = [path.parent.parent for path in sorted(devices.glob("*/power/control")) if _read(path) == "auto"]
     ours = [device.name for device in suspended if _read(device / "idVendor") in _VENDORS]
     if not ours:
-        return Finding(item, Health.GOOD, "no NI device and no serial adapter is suspended")
+        return Finding(item, Health.GOOD, "no NI device or serial adapter can be suspended")
     remedy = f'write "on" to the file power/control of each device in {devices}, or add a udev rule that does so'
-    return Finding(item, Health.BAD, f"may be suspended: {', '.join(ours)}", remedy)
+    return Finding(item, Health.BAD, f"can be suspended when idle: {', '.join(ours)}", remedy)
 
 
 _SELECTIVE = "48e6b7a6-50f5-4782-a5d4-53bb8f07e226"
 """Identifier of the setting "USB selective suspend" (Microsoft's documentation of power settings)."""
 _VENDORS = {"3923": "NI", "0403": "FTDI", "10c4": "Silicon Labs", "067b": "Prolific", "1a86": "WCH"}
-"""Vendors of the USB devices of a bench, by identifier."""
+"""Vendors of NI's USB devices and of serial adapters, by USB vendor identifier (hexadecimal)."""
 
 
 def _windows_usb_suspend(output: str) -> Finding:
-    """Evaluate the output of powercfg: the last number is the setting on battery, the number before it the setting on
-    mains power.
+    """Evaluate the output of powercfg: its last two numbers are the settings on mains power and on battery power, 0
+    for off.
     """
     item = "USB suspend"
     found = [word for word in output.split() if word.startswith("0x")]
@@ -214,7 +214,7 @@ def serial_ports(adapters: Path = Path("/sys/bus/usb-serial/devices"), devices: 
 
 
 def opengl(cards: Path = Path("/dev/dri")) -> Finding:
-    """Check the graphics for the window."""
+    """Check whether the window is installed and a graphics card is present."""
     if importlib.util.find_spec("PySide6") is None:
         return Finding(
             "OpenGL", Health.NOTICE, "the window is not installed", "to use the window, install the extra gui"
@@ -227,7 +227,7 @@ def opengl(cards: Path = Path("/dev/dri")) -> Finding:
 
 
 def device_server(address: str) -> Finding:
-    """Check whether the port of a device server responds through the firewall."""
+    """Check whether a device server accepts a connection at `address` (host:port)."""
     host, _, port = address.rpartition(":")
     try:
         with socket.create_connection((host, int(port)), timeout=2.0):

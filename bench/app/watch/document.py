@@ -1,4 +1,4 @@
-"""The document that the page shows: JSON values in displayed units, with every text ready to be shown."""
+"""State of the live page as JSON values: numbers in displayed units, and complete texts."""
 
 from collections.abc import Iterable
 from math import ceil, isfinite
@@ -19,17 +19,17 @@ from bench.app.ipc.messages import extremes
 from bench.app.watch.follower import RunRecord, SessionFollower
 
 BUCKETS = 250
-"""Number of parts into which the displayed duration of the traces is divided."""
+"""Number of intervals of the displayed traces; each is drawn with its minimum and maximum."""
 FULL = 500
-"""Ordinate of the largest value of a trace, which is sent as whole numbers."""
+"""Ordinate of the largest magnitude of a trace; ordinates are sent as integers."""
 CURVE = 300
-"""Largest number of parts of a curve, each with its minimum and maximum."""
+"""Maximum number of intervals to which a long curve is reduced, each with its minimum and maximum."""
 LEAST = 1e-3
-"""Smallest range of a trace in displayed units."""
+"""Smallest full-scale value of a trace, in displayed units."""
 
 
 def document_of(follower: SessionFollower) -> dict[str, object]:
-    """Parts of the document by name."""
+    """The parts of the page's state, by name."""
     record = follower.record
     return {
         "head": _head(follower),
@@ -131,14 +131,14 @@ def _matrix(record: RunRecord) -> dict[str, object] | None:
 
 
 def _cell(record: RunRecord, campaign: Campaign, place: tuple[int, int]) -> list[str]:
-    """Mark, level, text and status of a point."""
+    """Mark, level, text and status of the point at `place` (row, column)."""
     cell, end = campaign.cells[place], record.expected(place)
     mark, level = texts.POINT_MARKS.get(cell.status, texts.POINT_MARKS[texts.POINT_DONE])
     return [mark, level, cell.result or ("" if end is None else texts.EXPECTED.format(time=end)), cell.status]
 
 
 def _figure(record: RunRecord) -> dict[str, object] | None:
-    """The predicted lines of the gain, or a panel of the live view with measured lines."""
+    """Figure of the page: the live view's first panel with measured lines, or else the predicted gain curves."""
     contents = record.contents
     if (panel := record.panel) is not None:
         found = figure_of(panel)
@@ -170,7 +170,7 @@ def _figure(record: RunRecord) -> dict[str, object] | None:
 
 
 def _points(record: RunRecord) -> dict[str, object]:
-    """The measured points of the gain, and the running one."""
+    """Measured gains, and the running gain of the point in progress."""
     marks = [
         [_number(mark.x), _number(mark.gain), _number(mark.spread), str(mark.group), mark.varies]
         for mark in record.marks
@@ -198,7 +198,7 @@ def _traces(record: RunRecord) -> dict[str, object]:
 
 
 def _thinned(x: NDArray[np.float64], y: NDArray[np.float64]) -> list[object]:
-    """Abscissas and ordinates of a curve; minimum and maximum of each part of a long one."""
+    """Abscissas and ordinates of a curve; a long curve is reduced to the extremes of at most `CURVE` intervals."""
     if len(x) > 2 * CURVE:
         width = ceil(len(x) / CURVE)
         low, high = extremes(y[:, None], width)
@@ -212,7 +212,7 @@ def _significant(values: ArrayLike) -> list[float | None]:
 
 
 def _number(value: float | None) -> float | None:
-    """A number with five significant digits; None for one that JSON cannot represent."""
+    """`value` rounded to five significant digits; None if JSON cannot represent it."""
     return float(f"{value:.5g}") if value is not None and isfinite(value) else None
 
 

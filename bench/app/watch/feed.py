@@ -1,4 +1,4 @@
-"""The latest state of the page, serialised once for all browsers, and sent in the parts that have changed."""
+"""Latest state of the live page, serialised once for all browsers; a browser receives the changed parts only."""
 
 import json
 import threading
@@ -7,11 +7,11 @@ from collections.abc import Mapping
 from drivers.clock import now
 
 WANTED = 2.0
-"""Time after the last wait of a browser during which the document is kept up to date [s]."""
+"""Time for which the document is kept up to date after a browser last requested it [s]."""
 
 
 class Feed:
-    """Parts of a document, each a JSON value with the number of its last change."""
+    """Parts of a document as JSON texts, each with the version of the document in which it last changed."""
 
     def __init__(self) -> None:
         self._changed = threading.Condition()
@@ -26,7 +26,7 @@ class Feed:
         return now() - self._read < WANTED
 
     def publish(self, document: Mapping[str, object]) -> None:
-        """Replace the parts of the document. Raises ValueError for a number that JSON cannot represent."""
+        """Replace the changed parts of the document. Raises ValueError for a number that JSON cannot represent."""
         parts = {
             name: json.dumps(part, separators=(",", ":"), allow_nan=False).encode() for name, part in document.items()
         }
@@ -40,8 +40,8 @@ class Feed:
                 self._changed.notify_all()
 
     def since(self, version: int, timeout: float) -> tuple[int, bytes]:
-        """The present version, and the parts that changed after `version` (0 for all) as a JSON object; it is empty if
-        none changes within `timeout` seconds.
+        """The current version, and the parts that changed after `version` (0 for all) as a JSON object. Waits up to
+        `timeout` [s] for a change; without one, the object is empty.
         """
         with self._changed:
             self._read = now()
@@ -50,7 +50,7 @@ class Feed:
             return self._version, b"{%b}" % b",".join(b'"%b":%b' % (name.encode(), text) for name, text in found)
 
     def close(self) -> None:
-        """End all waits."""
+        """Close the feed, and end all waits for changes."""
         with self._changed:
             self.closed = True
             self._changed.notify_all()

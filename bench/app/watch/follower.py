@@ -1,4 +1,4 @@
-"""Follows the sessions of this computer, one after the other, as a client that requests nothing."""
+"""Read-only client that follows the sessions on this computer, one after another."""
 
 from collections import deque
 from dataclasses import replace
@@ -29,7 +29,7 @@ from drivers.clock import now
 SEARCH = 0.5
 """Interval between searches for a session [s]."""
 LOG_LINES = 100
-"""Number of kept lines of the log."""
+"""Maximum number of log lines kept."""
 
 
 class RunRecord:
@@ -49,7 +49,7 @@ class RunRecord:
         self.kind = kind_of({})
         self.marks: list[Mark] = []
         self.running: tuple[float, float] | None = None
-        """Abscissa [SI] and value of the running gain."""
+        """Abscissa (circular frequency [rad/s], or stiffness ratio) and value of the running gain."""
         self.log = deque[Notice](maxlen=LOG_LINES)
         self.trouble: Trouble | None = None
         self._read, self._length = nan, 0.0
@@ -66,7 +66,7 @@ class RunRecord:
 
     @property
     def stale(self) -> bool:
-        """Whether traces, meters and picture are not live."""
+        """Whether traces, meters and picture are out of date."""
         return not self.age < STALE or self.over
 
     @property
@@ -76,7 +76,7 @@ class RunRecord:
 
     @property
     def panel(self) -> Panel | None:
-        """The first panel of the live view with measured lines; None for a protocol with gains."""
+        """The first panel of the live view with measured lines; None if there is none or the protocol has gains."""
         protocol = self.contents.protocol
         if protocol is None or self.live is None or self.contents.has_gain:
             return None
@@ -104,7 +104,7 @@ class RunRecord:
                 face = self.contents.arrangement.face
                 self.contents.follow(event)
                 if face != self.contents.arrangement.face:
-                    # earlier samples of laser 2 are those of another target
+                    # earlier samples of laser 2 were measured on another target
                     self.ring.discard_before(self.contents.arranged)
                 if self.campaign is not None:
                     self.campaign.follow(event)
@@ -127,7 +127,7 @@ class RunRecord:
                 pass
 
     def expected(self, place: tuple[int, int]) -> datetime | None:
-        """Estimated end of a point of the campaign; None if unknown, or if it is complete."""
+        """Estimated end of the point at `place`; None if it is unknown, or if the point is complete."""
         if self.campaign is None or self.over:
             return None
         return self.campaign.expected(place, self.state.scene.time_left, datetime.now())
@@ -154,8 +154,8 @@ class RunRecord:
 
 
 class SessionFollower:
-    """Attaches to the session under way, real benches before others, and stays with it until it ends; the record of an
-    ended run is kept until the next one begins.
+    """Follower of the session under way, preferably that of a real bench, until it ends. The record of an ended run is
+    kept until the next session begins.
 
     process : identifier of the only process whose session is followed; None for any.
     """
@@ -170,7 +170,7 @@ class SessionFollower:
 
     @property
     def status(self) -> Status:
-        """Status of the bench."""
+        """Status of the bench for the page, with or without a session."""
         client = self._client
         if client is not None:
             return self.record.state.status(client.status, client.silence, lives=client.lives)
@@ -184,7 +184,7 @@ class SessionFollower:
 
     @property
     def others(self) -> int:
-        """Number of further sessions under way."""
+        """Number of sessions under way, excluding the followed one."""
         return max(len(self._found) - self.attached, 0)
 
     def update(self) -> None:
@@ -200,12 +200,12 @@ class SessionFollower:
             for message in self._client.take():
                 self.record.follow(message)
             if self.record.state.ended is not None:
-                # the process announces its session until its files are closed
+                # the session is still announced until its files are closed
                 self._ended = self.record.state.attached
                 self.close()
 
     def close(self) -> None:
-        """Leave the session, which is not affected."""
+        """Detach from the session, which continues unaffected."""
         client, self._client = self._client, None
         if client is not None:
             client.leave()

@@ -18,7 +18,7 @@ def main() -> None:
     """Serve the page until standard input is closed."""
     ignore_requests()
     if sys.platform != "win32":
-        # the run has priority
+        # lower the priority, so that the run takes precedence
         os.nice(5)
     assignment = json.loads(sys.stdin.readline())
     try:

@@ -18,9 +18,9 @@ from sim.errors import InvalidInput
 HEARTBEAT = 1.0
 """Longest interval between two messages to a browser [s]."""
 PATIENCE = 5.0
-"""Time after which a browser that neither sends its request nor reads is disconnected [s]."""
+"""Time after which a browser that neither sends a request nor reads the response is disconnected [s]."""
 MOST = 64
-"""Largest number of connections at a time; further ones are closed."""
+"""Maximum number of simultaneous connections; further ones are closed at once."""
 
 POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src data:; base-uri 'none'; "
@@ -48,7 +48,7 @@ class PageServer(ThreadingHTTPServer):
     """Serves the page of `feed` to browsers, each in a thread.
 
     address, port : interface and port to listen on; port 0 is any free one.
-    token : first part of every path; empty for none, which only a loopback address permits.
+    token : first part of every path; empty for none, which is permitted on a loopback address only.
 
     Raises InvalidInput if the address or the port cannot be used.
     """
@@ -72,11 +72,11 @@ class PageServer(ThreadingHTTPServer):
             why = f"the page cannot be served there ({error.strerror or error}); choose another address or --port"
             raise InvalidInput("--address", f"{address}, port {port}", why) from None
         except OverflowError:
-            raise InvalidInput("--port", port, "it must be 0 (any free port) to 65535") from None
+            raise InvalidInput("--port", port, "it must be from 0 (any free port) to 65535") from None
 
     @property
     def url(self) -> str:
-        """Address of the page."""
+        """Address (URL) of the page, including the token."""
         host, port = str(self.server_address[0]), self.server_address[1]
         if not is_loopback(host) and ip_address(host).is_unspecified:
             host = gethostname()
@@ -84,7 +84,7 @@ class PageServer(ThreadingHTTPServer):
         return f"http://{host}:{port}/{self.token + '/' if self.token else ''}"
 
     def start(self) -> None:
-        """Serve in a thread."""
+        """Serve connections in a background thread."""
         threading.Thread(target=self.serve_forever, kwargs={"poll_interval": 0.1}, name="page", daemon=True).start()
 
     def close(self) -> None:
@@ -94,7 +94,7 @@ class PageServer(ThreadingHTTPServer):
         self.server_close()
 
     def process_request(self, request: Any, client_address: Any) -> None:
-        """Serve a connection in a thread, unless there are too many."""
+        """Serve a connection in a thread; close it if `MOST` connections are already open."""
         if self._free.acquire(blocking=False):
             super().process_request(request, client_address)
         else:
@@ -107,7 +107,7 @@ class PageServer(ThreadingHTTPServer):
             self._free.release()
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """Ignore errors of a connection: a browser may leave at any time."""
+        """Ignore errors of a connection: a browser may disconnect at any time."""
 
 
 class Handler(BaseHTTPRequestHandler):
@@ -132,7 +132,7 @@ class Handler(BaseHTTPRequestHandler):
     do_HEAD = do_GET
 
     def __getattr__(self, name: str) -> Any:
-        """Every other method is refused; `http.server` looks up the method "do_X" of the request X."""
+        """Refuse all other request methods: `http.server` looks up the attribute "do_X" for the request method X."""
         if name.startswith("do_"):
             return self._refuse_method
         raise AttributeError(name)
@@ -151,11 +151,11 @@ class Handler(BaseHTTPRequestHandler):
         if token:
             given, _, path = path.partition("/")
         elif self.headers.get("Host", "").rsplit(":", 1)[0] not in self.server.hosts:
-            # a page of another site must not read this one through a host name that resolves to this computer
+            # DNS rebinding: another site must not read this page through a host name that resolves to this computer
             self._answer(HTTPStatus.FORBIDDEN, "text/plain", b"open the address that rockbench printed\n")
             return None
         if not hmac.compare_digest(given.encode(), token.encode()):
-            text = "the address lacks its token: open the address that rockbench printed\n"
+            text = "the token in the address is missing or wrong: open the address that rockbench printed\n"
             self._answer(HTTPStatus.FORBIDDEN, "text/plain", text.encode())
             return None
         if path not in (*self.server.pages, "events", "state"):
@@ -166,7 +166,7 @@ class Handler(BaseHTTPRequestHandler):
     def _answer(
         self, status: HTTPStatus, kind: str, content: bytes | None, further: dict[str, str] | None = None
     ) -> None:
-        # the body of a refused request is not read
+        # the body of a refused request is never read, so the connection cannot be reused
         self.close_connection = True
         self.send_response(status)
         length = {} if content is None else {"Content-Length": str(len(content))}
@@ -177,7 +177,7 @@ class Handler(BaseHTTPRequestHandler):
             self.wfile.write(content)
 
     def _stream(self) -> None:
-        """Send the document and then its changes, at most at the rate at which it is published."""
+        """Send the document and then its changes, with at most `HEARTBEAT` between two messages."""
         self._answer(HTTPStatus.OK, "text/event-stream", None)
         if self.command == "HEAD":
             return

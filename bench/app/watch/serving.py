@@ -13,25 +13,25 @@ from sim import waiting
 from sim.errors import InvalidInput
 
 PERIOD = 0.1
-"""Interval between two states of the page [s]."""
+"""Interval between updates of the page [s]."""
 LAST = 0.5
-"""Time for which the last state is still sent before the server ends [s]."""
+"""Time for browsers to receive the last state before the server ends [s]."""
 
 
 class LivePage:
-    """The page, served at `url` from its creation.
+    """The live page, served at `url` from its creation.
 
     address, port : interface and port to listen on; port 0 is any free one.
     process : identifier of the only process whose session is shown; None for any.
 
-    Raises InvalidInput if the address cannot be used, or if sessions are not announced.
+    Raises InvalidInput if the address cannot be used, or if sessions on this computer are not announced.
     """
 
     def __init__(self, address: str, port: int, *, with_token: bool = True, process: int | None = None) -> None:
         if sessions_folder() is None:
             why = (
-                "the live page needs the announcements of the sessions, in a folder that only this user can read: "
-                "unset the variable, or name such a folder"
+                "the live page finds sessions through their announcements in this folder, which only this user may "
+                "access: unset the variable, or set it to such a folder"
             )
             raise InvalidInput(FOLDER, os.environ.get(FOLDER, "not set"), why)
         self._feed, self._follower = Feed(), SessionFollower(process)

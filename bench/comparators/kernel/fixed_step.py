@@ -26,12 +26,12 @@ from sim.kernel.steps import (
 from sim.kernel.watching import UPLIFT_MARGIN
 
 STAGES = 5
-"""Number of rows of a step's scratch space: four stages and the state of a stage."""
+"""Number of rows of a step's scratch space: the rates of the four stages, and the state of a stage."""
 
 
 @compiled("Tuple((float64, float64))(float64[::1], float64)")
 def base(row: NDArray[np.float64], t: float) -> tuple[float, float]:
-    """Acceleration [m/s2] of the base and its rate [m/s3] at time `t` of a packed segment `row`."""
+    """Acceleration [m/s2] and jerk [m/s3] of the base at time `t` [s] from the start of the packed segment `row`."""
     phase = row[5] + t * (row[6] + 0.5 * row[7] * t)
     envelope = row[1] + t * (row[2] + t * (row[3] + t * row[4]))
     growth = row[2] + t * (2.0 * row[3] + 3.0 * t * row[4])
@@ -49,7 +49,7 @@ def driven_rates(
     x: NDArray[np.float64],
     out: NDArray[np.float64],
 ) -> None:
-    """`rates` under the base acceleration at time `t` of a packed segment `row`."""
+    """`rates` under the base acceleration at time `t` [s] from the start of the packed segment `row`."""
     rates(p, sg, x, base(row, t)[0], out)
 
 
@@ -65,10 +65,10 @@ def rk4(
     k: NDArray[np.float64],
     out: NDArray[np.float64],
 ) -> None:
-    """One classical step (Kutta, 1901) of length `h`. a0, a1 and a2 are the base accelerations at its start, middle and
-    end.
+    """One step of the classical Runge-Kutta method (Kutta, 1901), of length `h` [s]. a0, a1 and a2 are the base
+    accelerations [m/s2] at its start, middle and end.
 
-    k : scratch space, shape (STAGES, 6); its first row holds the rates at the start.
+    k : scratch space, shape (STAGES, 6); its first row receives the rates at the start.
     """
     rates(p, sg, x, a0, k[0])
     for j in range(6):
@@ -94,8 +94,8 @@ def between(
     t: float,
     out: NDArray[np.float64],
 ) -> None:
-    """The cubic Hermite polynomial of a step of length `h`, at time `t` from its start; it is of fourth order, like the
-    step.
+    """Cubic Hermite interpolation within a step of length `h` [s], at time `t` [s] from its start; its order is 4, like
+    that of the method.
     """
     s = t / h
     for j in range(6):
@@ -139,14 +139,14 @@ def run_paper(
     peaks_from: float,
     report: NDArray[np.float64],
 ) -> None:
-    """Integrate by the procedure of section 3.3 of the paper, unchanged: steps `dt` on one grid, impacts detected by
-    theta_{i-1} theta_i < 0.
+    """Integrate by the procedure of section 3.3 of the paper, unchanged: steps `dt` [s] on one grid, impacts detected
+    by theta_{i-1} theta_i < 0.
 
     parts : 1 for the harmonic procedure, with the impact at the step's end; more for the seismic procedure, which
     repeats the step in this number of parts, with the impact at the end of the part in which the sign changes. The
-    other arguments are those of `sim.kernel.rocking.run`. The block lifts when a step begins with |m| > b g M (Eq. 9,
-    A.3) and never returns to rest. Peaks are the largest values on the grid; samples are interpolated between grid
-    points.
+    other arguments are those of `sim.kernel.rocking.run`. The block lifts when the magnitude of the
+    overturning moment at the start of a step exceeds b g M (Eq. 9, A.3), and never returns to rest. Peaks are the
+    largest values on the grid; samples are interpolated between grid points.
     """
     following, k, part_slope = np.zeros(6), np.zeros((STAGES, 6)), np.zeros(6)
     peaks = report[PEAKS:]

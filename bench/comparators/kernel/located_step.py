@@ -1,7 +1,7 @@
-"""The classical Runge-Kutta method with a fixed step and events located to its own order.
+"""The classical Runge-Kutta method with a fixed step and events located to the order of the method.
 
-An event is located not by interpolation but by steps of other lengths from the same state, which preserves order 4. The
-method uses the equations of `sim.kernel.equations` and the report array of `sim.kernel.rocking.run`.
+An event is located not by interpolation but by trial steps of other lengths from the same state, which preserves order
+4. The method uses the equations of `sim.kernel.equations` and the report array of `sim.kernel.rocking.run`.
 """
 
 from math import ceil
@@ -38,7 +38,7 @@ def distance(
     t: float,
     x: NDArray[np.float64],
 ) -> tuple[float, float]:
-    """Distance of the state `x` at time `t` of a segment from `event`, positive before it, and its rate."""
+    """Distance of the state `x` at time `t` [s] of a segment from `event`, positive before it; its time derivative."""
     if event == IMPACT:
         return sg * x[4], sg * x[5]
     if event == OVERTURNING:
@@ -72,8 +72,8 @@ def located(
     smallest.
 
     Every trial is a whole Runge-Kutta step from `x` to `out`. The `known` roots theta = 0 at the start are divided out:
-    the target is a zero of distance / h^known, which is `first` at h = 0. Method: false position with the halving of
-    Dowell and Jarratt (1971).
+    the method finds a zero of distance / t^known over the length t of the step; at t = 0 it is `first`. Method: false
+    position with the halving of Dowell and Jarratt (1971).
     """
     a0, side = base(row, tau)[0], 0
     low, high, below, above = 0.0, h, first, 0.0

@@ -75,7 +75,7 @@ def test_a_suspended_device_of_the_bench_is_named(tmp_path: Path) -> None:
         (tmp_path / name / "idVendor").write_text(f"{vendor}\n")
         (tmp_path / name / "power" / "control").write_text(f"{mode}\n")
     found = usb_suspend(tmp_path, "linux")
-    assert (found.health, found.found) == (Health.BAD, "may be suspended: 1-2")
+    assert (found.health, found.found) == (Health.BAD, "can be suspended when idle: 1-2")
     (tmp_path / "1-2" / "power" / "control").write_text("on\n")
     assert usb_suspend(tmp_path, "linux").health is Health.GOOD
 

@@ -77,7 +77,7 @@ def test_a_file_that_stays_held_is_the_reason_of_the_end(
     end = recorder.sync if at == "flush" else partial(recorder.close, "completed")
     with pytest.raises(DataFileError, match=r"another program has locked it \(errno 13\)") as raised:
         end()
-    assert "has held it for 0.1 s" in str(raised.value)
+    assert "it remained locked for 0.1 s" in str(raised.value)
     recorder.close("completed")
 
 

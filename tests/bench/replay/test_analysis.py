@@ -58,7 +58,7 @@ def test_a_result_that_was_changed_is_found(analysis: Path, capsys: pytest.Captu
 def test_a_campaign_that_is_another_one_now_is_told(analysis: Path, capsys: pytest.CaptureFixture[str]) -> None:
     original = analysis.with_name("campaign.h5")
     original.write_bytes(original.read_bytes() + b"\0")
-    assert "campaign.h5, is not the file that was analysed" in told(capsys, "verify", str(analysis))
+    assert "campaign.h5 is not the file that was analysed" in told(capsys, "verify", str(analysis))
     original.unlink()
     assert main(["file", "verify", str(analysis)]) == 0
 

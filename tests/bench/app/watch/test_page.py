@@ -155,7 +155,7 @@ def test_a_port_in_use_and_sessions_that_are_not_announced_are_refused(
 def test_a_folder_that_others_may_read_is_named_in_the_refusal(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     tmp_path.chmod(0o755)
     monkeypatch.setenv("ROCKBENCH_SESSIONS", str(tmp_path))
-    with pytest.raises(InvalidInput, match="that only this user can read") as caught:
+    with pytest.raises(InvalidInput, match="which only this user may access") as caught:
         LivePage("127.0.0.1", 0)
     assert caught.value.value == str(tmp_path)
 
