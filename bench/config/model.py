@@ -60,8 +60,8 @@ class BenchConfiguration(Parameters):
     table_model: str | None = quantity(
         None,
         "",
-        "JSON file of an identified table model, used to predict the drive; if absent, the drive is predicted "
-        "from the simulated shaker",
+        "JSON file of an identified table model, relative to this file, used to predict the drive; if absent, the "
+        "drive is predicted from the simulated shaker",
         example="table_model.json",
     )
     limits: Limits = Limits()

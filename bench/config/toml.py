@@ -99,7 +99,9 @@ def problems_of(path: Path) -> list[InvalidInput]:
 
 def _read(path: Path) -> BenchConfiguration:
     read = validated(BenchConfiguration, read_table(path, "configuration file"), _within(path))
-    return _with_certificates(_with_calibration_file(_with_specimen_file(read, path), path), path)
+    for resolve in (_with_specimen_file, _with_calibration_file, _with_table_model, _with_certificates):
+        read = resolve(read, path)
+    return read
 
 
 def _refusals(configuration: BenchConfiguration, path: Path) -> list[InvalidInput]:
@@ -126,6 +128,15 @@ def _with_calibration_file(configuration: BenchConfiguration, path: Path) -> Ben
         return configuration
     found = read_calibration(path.parent / configuration.laser_calibration)
     return configuration.model_copy(update={"laser_calibration": None, "calibrated": found})
+
+
+def _with_table_model(configuration: BenchConfiguration, path: Path) -> BenchConfiguration:
+    """Replace the name of the table model, relative to the folder of `path`, by its absolute path: the model is read
+    when it is used, because its age is checked then.
+    """
+    if configuration.table_model is None:
+        return configuration
+    return configuration.model_copy(update={"table_model": str(path.absolute().parent / configuration.table_model)})
 
 
 def _with_certificates(configuration: BenchConfiguration, path: Path) -> BenchConfiguration:

@@ -154,7 +154,7 @@ def test_a_byte_order_mark_is_no_error(tmp_path: Path):
         ("[rig]\nsample_rate = 1000.0", r"rig = .* is refused: .* \[simulation\]; remove \[rig\]"),
         (
             "[simulation.bench.filter_unit]\ncutoff = 4e3",
-            "simulation.bench.filter_unit.cutoff = 4000.0 .* sample_rate / 2",
+            "simulation.bench.filter_unit.cutoff = 4000.0 .* half the sample rate",
         ),
         (
             "[limits]\nvelocity = 0\n[ramps]\nstop = 0",
@@ -354,3 +354,12 @@ def test_certificates_are_relative_to_the_configuration_file(tmp_path: Path, mon
     assert Path(tls.root_certificate) == folder / "server.pem"
     assert Path(str(tls.client_certificate)).resolve() == tmp_path / "client.pem"
     assert Path(str(tls.client_key)) == other
+
+
+def test_a_table_model_is_relative_to_the_configuration_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = tmp_path / "bench"
+    folder.mkdir()
+    (folder / "bench.toml").write_text('table_model = "table/model.json"\n', encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    read = read_configuration(Path("bench/bench.toml"))
+    assert read.table_model == str(folder / "table" / "model.json")
