@@ -1,4 +1,4 @@
-"""`rockbench watch`, and the live page of a run with `--watch`."""
+"""The command `rockbench watch`, and the live page that `--watch` adds to a run."""
 
 import json
 import os
@@ -25,22 +25,22 @@ class PageOptions:
         str,
         Parameter(
             metavar="ADDRESS",
-            help="Network address on which the page is served: 0.0.0.0 for all networks of this computer.",
+            help="Network address on which the page is served; 0.0.0.0 stands for all networks of this computer.",
             show_default="127.0.0.1, for browsers on this computer only",
         ),
     ] = "127.0.0.1"
     port: Annotated[int, Parameter(metavar="INT", help="Port of the page.", show_default="any free port")] = 0
     no_token: Annotated[
-        bool, switch("Serve the page without a secret in its address; refused except on a loopback address.")
+        bool, switch("Serve the page without a secret in its address; allowed on a loopback address only.")
     ] = False
 
 
 def watch(*, page: PageOptions = PageOptions(), progress: Handed = silent) -> int:
     """Serve a read-only live page of the run under way on this computer.
 
-    The page shows verdict, state, meters of the limits, picture, traces, points and log, and follows every run that a
-    window or `rockbench run` starts. It cannot change or stop a run. Its address, which contains a secret, is printed
-    on standard output; Ctrl-C ends it.
+    The page shows the verdict, the state, the limit meters, a picture of the specimen, the traces, the points and the
+    log of every run that a window or `rockbench run` starts. It cannot change or stop a run. Its address, which
+    contains a secret unless --no-token is given, is printed on standard output. Ctrl-C ends the command.
     """
     progress("starting the live page")
     from bench.app.cli.interrupt import until_interrupted
@@ -56,8 +56,8 @@ def watch(*, page: PageOptions = PageOptions(), progress: Handed = silent) -> in
 
 @contextmanager
 def live_page(page: PageOptions) -> Generator[None]:
-    """Context manager in which another process serves the live page of this process's run. Raises InvalidInput if the
-    page cannot be served.
+    """Context manager in which a child process serves the live page of this process's run. Raises InvalidInput if the
+    page cannot be served, and RockbenchError if the child process ends without an answer.
     """
     from drivers.child import ChildProcess
 
@@ -73,7 +73,7 @@ def live_page(page: PageOptions) -> Generator[None]:
         child.write(json.dumps(assignment).encode() + b"\n")
         line = child.output.readline()
         if not line:
-            raise RockbenchError("the process of the live page ended without a message; start the run without --watch")
+            raise RockbenchError("the process of the live page ended without an error message; start the run without --watch")
         answer = json.loads(line)
         if "url" not in answer:
             raise InvalidInput(answer["item"], answer["value"], answer["allowed"])

@@ -21,7 +21,7 @@ from sim.extras import require
 HEADLESS = "`rockbench run`, which needs no window"
 
 PROBE = "from PySide6.QtGui import QGuiApplication; QGuiApplication([])"
-"""Start-up test of Qt, for a separate process: on failure Qt ends the process with SIGABRT."""
+"""Python code that starts Qt as a test. It is run in a separate process, because Qt aborts the process on failure."""
 
 PATIENCE = 20.0
 """Timeout for the display [s]; a forwarded display may be slow."""
@@ -74,8 +74,9 @@ def gui(
 ) -> int:
     """Open the operator's window.
 
-    Runs are separate processes. When the window closes, they ramp the output to zero, unless they were set to continue
-    without it. STOP in the window is a request to the software; the emergency stop is the red button at the bench.
+    Each run is a separate process. When the window closes, the run ramps the output to zero and ends, unless it was set
+    to continue without the window. STOP in the window is a request to the software; the emergency stop is the red
+    button at the bench.
     """
     require("gui", "rockbench gui")
     progress("opening the window")
@@ -84,9 +85,9 @@ def gui(
     protocols, failed = all_protocols()
     for line in failed:
         print_warning(line)
-    # the paper's campaign is selected first
+    # the window selects the first protocol: the campaign of the paper
     protocols = sorted(protocols, key=lambda each: each.name != "harmonic")
-    # until the window installs the handler that closes it; PySide6 aborts on an exception that is raised in its import
+    # Ctrl-C ends the process until the window installs its own handler: an exception during the import aborts PySide6
     with leaving():
         from bench.app.gui.window import open_window
 
@@ -94,7 +95,7 @@ def gui(
 
 
 def require_display() -> None:
-    """Check that Qt can open a window. Raises NoDisplay naming the missing variable or library."""
+    """Check that Qt can open a window. Raises NoDisplay naming the environment variable or library that prevents it."""
     if sys.platform in ("win32", "darwin"):
         return
     chosen = next((name for name in ("QT_QPA_PLATFORM", "WAYLAND_DISPLAY", "DISPLAY") if os.environ.get(name)), None)

@@ -1,1 +1,1 @@
-"""Contents of the run displays, independent of Qt: declared once for the window and the live page."""
+"""Contents of the run displays, shared by the window and the live page, and independent of Qt."""

@@ -1,4 +1,4 @@
-"""Buffers of the live view: the last minute of traces, and the last seconds of the twin's block angle."""
+"""Buffers of the live view: the last minute of traces, and the last 5 s of the block angle from the live twin."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,18 +10,18 @@ _SECONDS, _THETA = (TWIN_TRACE.index(name) for name in ("seconds", "theta"))
 STEP = 0.01
 """Interval between two stored angles of the twin [s]."""
 KEPT = 500
-"""Number of stored angles: five seconds."""
+"""Number of stored angles, for 5 s."""
 BEHIND = 2.0
-"""Largest permitted lag of the twin behind the measurement [s], in bench time. Such lags occur when a run is faster
-than real time.
+"""Largest lag of the twin [s] for which the display waits for its angle, in bench time. The twin lags behind the
+measurement when a run is faster than real time.
 """
 CAPACITY = 30_000
-"""Number of stored bins: a minute at two milliseconds each."""
+"""Number of stored bins: one minute at 2 ms per bin."""
 
 
 class Ring:
-    """Ring buffer of bins in order of arrival; a gap in time is one empty (NaN) bin. The arrays have twice the
-    capacity, so that the content is always contiguous.
+    """Ring buffer of bins in order of arrival. A bin has the minimum and the maximum of each signal; a gap in time is
+    one bin of NaN. The arrays have twice the capacity, so that the content is always contiguous.
     """
 
     def __init__(self, n_signals: int, capacity: int = CAPACITY) -> None:
@@ -35,7 +35,7 @@ class Ring:
 
     @property
     def newest(self) -> float:
-        """Bench time at the end of the last bin [s]; NaN without bins."""
+        """Bench time at the end of the last bin [s]; NaN for an empty buffer."""
         return float(self._time[self._end - 1]) if self._size else float("nan")
 
     def clear(self) -> None:
@@ -56,18 +56,18 @@ class Ring:
         self._append(times, traces.low, traces.high)
 
     def window(self, seconds: float, buckets: int) -> tuple[NDArray[np.float64], NDArray[np.float32]]:
-        """The last `seconds` as a line through the extremes of `buckets` parts of equal length, and of the part in
-        which the displayed interval begins.
+        """The last `seconds` as a line through the minimum and the maximum of each part of length `seconds / buckets`.
 
         Returns times relative to the newest sample [s], shape (n,), zero or negative, and values, shape (n, n_signals):
         the minimum, then the maximum of each part. Parts begin at multiples of their length in bench time,
-        independently of the blocks, so that a scrolling line does not flicker.
+        independently of the blocks, so that a scrolling line does not flicker. The interval therefore begins within a
+        part, which is included: there are at most `buckets` + 1 parts.
         """
         if not self._size:
             return np.zeros(0), np.zeros((0, self._low.shape[1]), dtype=np.float32)
         first, length = self._end - self._size, seconds / buckets
         parts: NDArray[np.float64] = np.ceil(self._time[first : self._end] / length)
-        # counted back from the newest part: the start of the window may round to either side of a boundary
+        # the first part is counted back from the newest: the start time may be rounded to either side of a boundary
         whole = int(np.searchsorted(parts, float(parts[-1]) - buckets))
         starts = np.flatnonzero(np.concatenate(([True], parts[whole + 1 :] > parts[whole:-1])))
         kept = slice(first + whole, self._end)
@@ -77,15 +77,17 @@ class Ring:
         return np.repeat(self._time[kept][starts] - self.newest, 2), values
 
     def newest_bins(self, seconds: float) -> tuple[NDArray[np.float64], NDArray[np.float32], NDArray[np.float32]]:
-        """Bench times of the bins of the last `seconds` [s], shape (n,), and their extremes, shape (n, n_signals)."""
+        """Bench times at the ends of the bins of the last `seconds` [s], shape (n,), and the minima and the maxima in
+        these bins, each of shape (n, n_signals).
+        """
         first = self._end - self._size
         first += int(np.searchsorted(self._time[first : self._end], self.newest - seconds)) if self._size else 0
         kept = slice(first, self._end)
         return self._time[kept], self._low[kept], self._high[kept]
 
     def at(self, time: float) -> NDArray[np.float64]:
-        """Midpoints of the bin at bench time `time` [s], shape (n_signals,); those of the newest or oldest bin for a
-        time outside the buffer, and zero without bins.
+        """Midpoint between minimum and maximum of each signal in the bin at bench time `time` [s], shape (n_signals,).
+        A time outside the buffer selects the newest or the oldest bin; an empty buffer gives zeros.
         """
         if not self._size:
             return np.zeros(self._low.shape[1])
@@ -115,7 +117,7 @@ class Ring:
 
 
 class BlockAngle:
-    """The angle of the block over bench time, as published by the live twin: no sensor measures it."""
+    """Angle of the block over bench time, as computed and published by the live twin."""
 
     def __init__(self) -> None:
         self._run, self._origin = 0, 0.0
@@ -128,7 +130,7 @@ class BlockAngle:
             self._time, self._angle = np.zeros(0), np.zeros(0)
 
     def add(self, estimate: TwinEstimate) -> None:
-        """Append a part of the twin's trace; a part of a different run is ignored."""
+        """Append a part of the twin's trace; a part that belongs to another run is ignored."""
         if estimate.run != self._run:
             return
         stood = estimate.trace[np.isfinite(estimate.trace[:, _THETA])]

@@ -1,4 +1,4 @@
-"""The points of a campaign, each with its state, result and expected end."""
+"""The points of a campaign, each with its status, result and expected end."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from bench.live_values import Estimate, RunningGain
 from bench.protocol import Axis, Protocol
 
 Place = tuple[int, int]
-"""Row and column of a point."""
+"""Row and column of a point in the matrix."""
 
 
 @dataclass
@@ -27,8 +27,8 @@ class Cell:
 
 
 class Campaign:
-    """The points of a run in the order of its parameters; `rows` and `columns` are the values of the two parameters
-    that span the matrix, or their names in the prediction.
+    """The points of a run in the order of its parameters. `rows` and `columns` are the values of the two parameters
+    that span the matrix, or the names that the prediction gives to these values.
     """
 
     def __init__(self, protocol: Protocol[Any], run: Run) -> None:
@@ -40,8 +40,8 @@ class Campaign:
         self.name_points({})
 
     def name_points(self, prediction: Table) -> None:
-        """Replace the values of an axis of strings by the names in the prediction, in the same order, and reset all
-        points: the results name a record, whereas the parameter may be a file path or empty.
+        """Replace the values of each axis of strings with the names in the prediction, in its order, and reset all
+        points. Results identify a record by its name, whereas the parameter may be a file path or empty.
         """
         for axis, values in zip(self._axes or (), (self.rows, self.columns), strict=False):
             column = prediction.get(axis.field)
@@ -74,8 +74,8 @@ class Campaign:
                 pass
 
     def expected(self, place: Place, remaining: float, now: datetime) -> datetime | None:
-        """Estimated end of a point, if the remaining points share the `remaining` time [s] equally; None for a finished
-        point or an unknown time.
+        """Estimated end of a point, on the assumption that all unfinished points take equal parts of the `remaining`
+        time [s]; None for a finished point, or if `remaining` is not finite.
         """
         left = [*([] if self.current is None else [self.current]), *self.waiting]
         if place not in left or not isfinite(remaining):

@@ -18,8 +18,8 @@ LEAST = 1e-3
 
 
 def live_view(protocol: Protocol[Any], run: LiveRun) -> LiveView:
-    """The parts of the live view. An error in the protocol's function is shown instead of them: it must not affect
-    the display of the bench.
+    """The parts of the live view. If the protocol's function raises an error, a panel with the error is shown instead,
+    so that the rest of the display is not affected.
     """
     try:
         with plugin_code(f"the live view of {protocol.name}"):
@@ -54,7 +54,7 @@ class Figure:
 
 
 def figure_of(panel: Panel) -> Figure:
-    """A panel in displayed units."""
+    """A panel converted to displayed units."""
     (x_name, x_unit), (y_name, y_unit) = panel.x, panel.y
     x_factor, x_shown = in_screen_unit(x_unit)
     y_factor, y_shown = in_screen_unit(y_unit)

@@ -17,9 +17,9 @@ from bench.datafile.tables import Table
 Kind = Literal["spectrum", "curve"]
 
 LOW, HIGH = "alpha_2_low", "alpha_2_high"
-"""Columns of a prediction with the uncertainty band of alpha_2 (k = 2), where known."""
+"""Columns of a prediction with the bounds of the gain alpha_2 (k = 2); a prediction may lack them."""
 LEAST = 1e-3
-"""Smallest gain that is drawn: the axis of a spectrum is logarithmic."""
+"""Lower bound of drawn gains, because the axis of a spectrum is logarithmic; smaller ones are drawn at this value."""
 NOT_PLAYED = "not played"
 """Status of points without a measurement, which are not drawn."""
 _SPECTRUM = frozenset({"omega", "beta", "alpha_2", "layer"})
@@ -33,7 +33,7 @@ class Line:
     group : stiffness or name of the record, represented by the colour.
     x, gain : abscissa, ascending, and gain, both of shape (n,).
     band : lower and upper bounds of the gain, shape (2, n), NaN where the motion is unstable; None if unknown.
-    strong : False for the branch of the resting block.
+    strong : whether the line is drawn thick; False for the branch of the resting block.
     """
 
     group: float | str
@@ -46,7 +46,9 @@ class Line:
 
 @dataclass(frozen=True)
 class Mark:
-    """A measured point; `gain` is None if none was measured, and `spread` is the expanded uncertainty of the gain."""
+    """A measured point at abscissa `x`; `gain` is None if none was measured, and `spread` is the expanded uncertainty
+    of the gain.
+    """
 
     group: float | str
     x: float
@@ -107,7 +109,7 @@ def lines_of(prediction: Table) -> list[Line]:
 
 
 def mark_of(point: Mapping[str, Any]) -> Mark | None:
-    """The mark for a recorded point; None if it has no gain fields or was not played."""
+    """The mark for a recorded point; None if the point has no fields of a gain, or if its motion was not played."""
     beta = point.get("beta")
     if beta is None or "alpha_2" not in point:
         return None

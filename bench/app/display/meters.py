@@ -52,8 +52,8 @@ class Meter:
 
     @property
     def time_to_limit(self) -> float:
-        """Time until the limit at the present growth [s]; infinite if the quantity grows by less than `GROWTH`, is
-        below `NEAR` of its limit, or has been recorded for less than 1.5 `SPAN`.
+        """Time [s] in which the quantity reaches its limit at the present rate of growth; infinite if it grows by less
+        than `GROWTH`, is below `NEAR` times its limit, or has been recorded for less than 1.5 `SPAN`.
         """
         if not self._past:
             return inf
@@ -89,7 +89,7 @@ class Meter:
 
 
 def meters_of(configuration: BenchConfiguration, margins: Sequence[Margin] = ()) -> list[Meter]:
-    """Meters of a bench, with the planned values of a run with these `margins`."""
+    """Meters of a bench; `margins` are those of the planned run, and determine the planned values."""
     likely = {each.bound.quantity: each.demand.likely for each in margins if each.demand.likely is not None}
     found = [
         Meter(

@@ -1,5 +1,4 @@
-"""Picture of the specimen: table, frame, spring, block and beams of the lasers as shapes to scale, with magnified
-motion.
+"""Picture of the specimen: table, frame, spring, block and laser beams as shapes drawn to scale, with magnified motion.
 """
 
 from collections.abc import Iterator
@@ -19,9 +18,9 @@ from sim.specimen import Specimen
 FACTOR = 5
 """Initial magnification of the motion."""
 COILS, STEEPEST = 9, 1.4
-"""Number of turns of the spring; largest drawn angle [rad]."""
+"""Number of zigzag points of the spring; largest drawn angle of the block [rad]."""
 FLASH = 0.15
-"""Time for which an impact is displayed [s]."""
+"""Time for which an impact is displayed [s], in bench time."""
 X_G, U_1, U_2 = (TRACES.index(name) for name in ("displacement", "u1", "u2"))
 
 Role = Literal["table", "column", "storey", "spring", "beam", "block", "unknown", "contact", "impact"]
@@ -30,10 +29,11 @@ Point = tuple[float, float]
 
 @dataclass(frozen=True)
 class Shape:
-    """A part of the picture: a line through `points`, in metres to the right of the middle and above the table.
+    """A part of the picture: a line through `points` (x, y) [m]. The origin is on the table, midway between frame and
+    block at rest; x points to the right and y upwards.
 
     role : kind of the part, which selects its style. "block" and "unknown" (a block at an unknown angle) are closed;
-        "contact" and "impact" are one point, to be marked.
+        "contact" and "impact" have one point, at which a mark is drawn.
     """
 
     role: Role
@@ -60,16 +60,20 @@ def pose_of(
     specimen: Specimen,
     factor: float = 1.0,
 ) -> Pose:
-    """Pose at one instant, magnified by `factor`. `motion` has the signals `bench.app.ipc.messages.TRACES`, and `block`
-    the modelled angle of the block [rad] and the time since its last impact [s]; it is None if unknown. While laser 2
-    measures the block, the angle follows from the measured displacement, and storey 2 is drawn above storey 1.
+    """Pose at one instant, magnified by `factor`.
+
+    motion : signals `bench.app.ipc.messages.TRACES` in SI units, shape (n_signals,).
+    block : modelled angle of the block [rad] and time since its last impact [s]; None if unknown.
+
+    While laser 2 measures the block, the angle follows from the measured displacement, and storey 2 is drawn straight
+    above storey 1.
     """
     motion = np.nan_to_num(motion)
     angle, struck = (0.0, inf) if arrangement.block_clamped else block or (None, inf)
     frame = specimen.frame
     first, second = float(motion[U_1]), float(motion[U_2])
     if arrangement.pull:
-        # the signals were zeroed while storey 2 was held, which displaces storey 1 by the static force
+        # the zero of the signals is the pulled position: storey 2 held at `pull`, storey 1 displaced by the static force
         first += frame.k2 / (frame.k1 + frame.k2) * arrangement.pull
         second += arrangement.pull
     if arrangement.face is not None:
@@ -103,14 +107,14 @@ class Outline:
         self.specimen = specimen
         frame, block = specimen.frame, specimen.block
         self.height = 1.1 * max(frame.h2, 2.0 * block.h_b)
-        """Height of the picture."""
+        """Height of the picture [m]."""
         self.half = 0.35 * frame.h1 + 0.05
-        """Half the width of a storey."""
+        """Half the width of a storey [m]."""
         self.frame = -self.half - 0.5 * specimen.d
         self.block = self.frame + self.half + specimen.d + block.b
-        """Centres of frame and block at rest."""
+        """Horizontal positions of the centres of frame and block at rest [m]."""
         self.ends = self.frame - 1.6 * self.half, self.block + 2.0 * block.b
-        """Ends of the table at rest."""
+        """Horizontal positions of the ends of the table at rest [m]."""
 
     def shapes(self, pose: Pose, arrangement: Arrangement) -> tuple[Shape, ...]:
         """All parts of the picture."""
@@ -127,7 +131,7 @@ class Outline:
             yield Shape("storey", ((left - half + x, y), (left + half + x, y)))
 
     def _beams(self, pose: Pose, arrangement: Arrangement) -> Iterator[Shape]:
-        """Beams of the lasers, from the edge of the picture or, to the block, from the frame."""
+        """Laser beams: to the storeys from the left edge of the picture, to the block from the frame."""
         frame, left = self.specimen.frame, self.frame + pose.ground - self.half
         yield Shape("beam", ((self.ends[0], frame.h1), (left + pose.first, frame.h1)))
         if arrangement.face is None:

@@ -25,7 +25,7 @@ class Measured:
     """A measured quantity of a point and its prediction, in the SI `unit`, with expanded uncertainties (k = 2). NaN
     where there is no value.
 
-    low, high : bounds of a predicted interval, which is shown instead of `predicted_uncertainty`.
+    low, high : bounds of the predicted interval, shown after the predicted value.
     agrees : whether measurement and prediction agree; None without a comparison.
     status : status of the point.
     field : name of the quantity in the data of the point.
@@ -94,8 +94,9 @@ class Measured:
 def rows_of(
     results: Mapping[str, Column], points: Sequence[Mapping[str, Any]], labels: Mapping[str, str] = NO_LABELS
 ) -> list[Measured]:
-    """Quantities of all points: the fields with an uncertainty or, if no field has one, the numbers after the first,
-    which identifies the point. A loop check has a row for each of its lines. `labels` are the printed names of fields.
+    """Rows for all points: one for each field with an uncertainty or, if no field has one, for each number except the
+    first, which identifies the point. A loop check has a row for each of its lines. `labels` are the displayed names of
+    fields.
     """
     stems = {name: without_unit(name, column.unit) for name, column in results.items()}
     if {"measured", "expected", "unit"} <= results.keys():
@@ -128,7 +129,7 @@ def summary_of(rows: Sequence[Measured]) -> str:
 def every_field(
     results: Mapping[str, Column], points: Sequence[Mapping[str, Any]]
 ) -> tuple[list[str], list[list[str]]]:
-    """Headings with units, and the texts of every field of every point."""
+    """Column headings with units, and for each point the texts of all its fields."""
     headings: list[str] = []
     for name, column in results.items():
         unit = in_screen_unit(column.unit)[1]
@@ -176,7 +177,7 @@ def _rows(
 
 
 def _line(point: Mapping[str, Any]) -> Measured:
-    """Table row for one result of the loop check, in its unit."""
+    """Table row for one line of the loop check, in the unit of that line."""
 
     def number(name: str) -> float:
         value = point.get(name)

@@ -21,16 +21,18 @@ from bench.live_values import Estimate, LiveValue, RunningGain
 from bench.protocol import Protocol
 
 ROUNDING = 1e-3
-"""Half a bin of the traces [s]: in virtual time, an action follows the last sample immediately."""
+"""Half a bin of the traces [s]. A bin that ends within this time after an operator's action belongs to the samples
+before it: in virtual time, an action follows the last sample immediately.
+"""
 
 
 class RunContents:
     """Contents of the display of one run.
 
     protocol : the protocol; None before the first run.
-    sentence : the verdict, or the running value, in one sentence.
+    sentence : the running value or, once there is one, the verdict, in one sentence.
     point : the current or last point.
-    arrangement : the specimen on the table and the targets of the lasers.
+    arrangement : the specimen on the table, its clamps and the target of laser 2.
     arranged : bench time of the operator's last action [s]; earlier samples belong to another arrangement.
     """
 
@@ -44,14 +46,14 @@ class RunContents:
 
     @property
     def has_gain(self) -> bool:
-        """Whether the points of the protocol have a gain."""
+        """Whether the points of the protocol have a gain; True before the first run."""
         return self.protocol is None or "alpha_2" in self.protocol.point.model_fields
 
     def instant(
         self, ring: Ring, block: BlockAngle, moment: float
     ) -> tuple[NDArray[np.float64], tuple[float, float] | None]:
-        """Signals and angle of the block at a bench time [s], as from `Ring.at` and `BlockAngle.at`; zero and None
-        before the first sample with the present arrangement.
+        """Signals and angle of the block at bench time `moment` [s], as returned by `Ring.at` and `BlockAngle.at`;
+        zeros and None before the first sample with the present arrangement.
         """
         signals = ring.at(moment)
         return (signals, block.at(moment)) if moment > self.arranged else (np.zeros_like(signals), None)
@@ -88,7 +90,7 @@ class RunContents:
         if protocol.log_line is not None:
             self.sentence = spaced(protocol.log_line(event.point))
         elif protocol.view.headline or not self._has_live_value:
-            # for a protocol without a headline, the live value is the verdict
+            # a protocol without a headline keeps its live value as the verdict
             self.sentence = verdict_of(protocol.view, event.point)
         if "alpha_2" not in point:
             return
@@ -112,10 +114,10 @@ class RunContents:
 
 
 def _sine(omega: float, beta: float | None) -> str:
-    """Name of a point under a sine."""
+    """Name of a point whose motion is a sine."""
     return (texts.BARE_SINE if beta is None else texts.SINE_POINT).format(omega=omega, beta=beta)
 
 
 def _record(record: str, beta: float | None) -> str:
-    """Name of a point under a record."""
+    """Name of a point whose motion is an earthquake record."""
     return (texts.BARE_RECORD if beta is None else texts.RECORD_POINT).format(record=record, beta=beta)

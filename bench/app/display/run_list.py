@@ -32,16 +32,16 @@ DEPTH = 2
 MOST = 10_000
 """Largest number of listed files."""
 RECENT = 60.0
-"""Largest age of the last change with which a file that was not closed counts as being written [s]: a writer on
-another computer is not registered on this one.
+"""Time since the last change [s] up to which an unclosed file is regarded as being written, because a writer on another
+computer is not among the sessions of this one.
 """
 UNUSABLE = (RockbenchError, *UNREADABLE)
 
 
 @dataclass(frozen=True)
 class Found:
-    """A data file. `stamp` changes with the file, and when a summary or a picture is added to its folder; `figures` are
-    the pictures in the folder.
+    """A data file. `changed` is the time of its last change [s since 1970]; `stamp` differs after a change of the file
+    and after a summary or a picture was added to its folder; `figures` are the pictures in the folder.
     """
 
     path: Path
@@ -66,13 +66,13 @@ class RunRow:
 
     @property
     def searched(self) -> str:
-        """The searched text, in lower case."""
+        """Text in which a search looks for words, in lower case."""
         return "\n".join((*self.cells, *self.tips)).lower()
 
 
 def find_runs(folder: Path) -> tuple[Found, ...]:
-    """The data files in `folder` and the folders below it, the last changed first; `MOST` at most. Raises OSError if
-    the folder cannot be read.
+    """At most `MOST` data files in `folder` and in `DEPTH` levels of subfolders, the most recently changed one first.
+    Raises OSError if the folder cannot be read.
     """
     found = list[Found]()
     _find(folder, DEPTH, found)
@@ -98,7 +98,7 @@ def _find(folder: Path, depth: int, found: list[Found]) -> None:
         try:
             stat = entry.stat()
         except OSError:
-            # removed since
+            # the file has been removed since
             continue
         stamp = (stat.st_mtime_ns, stat.st_size, summary, len(figures))
         found.append(Found(Path(entry.path), stat.st_mtime, stamp, tuple(figures)))
@@ -110,7 +110,7 @@ def _find(folder: Path, depth: int, found: list[Found]) -> None:
 
 
 def read_row(found: Found) -> RunRow:
-    """The row of a data file. The row of a file that is damaged, or is not that of a run, gives the reason."""
+    """The row of a data file. If the file is damaged or does not contain a run, the row states the reason."""
     try:
         heading = read_heading(found.path)
     except InvalidInput as error:
@@ -164,7 +164,7 @@ def _result(found: Found, heading: Heading) -> tuple[str, str]:
         protocol = load_protocol(heading.metadata.get("protocol", ""))
     except RockbenchError:
         return "", ""
-    # the results of another program are not trusted, and those of a newer version may have other fields
+    # results that another program or a newer version has written may be invalid; the row then has no result
     try:
         summary = _summary(found.path.with_name(SUMMARY))
         if (passed := summary.get("passed")) is not None:
@@ -178,7 +178,7 @@ def _result(found: Found, heading: Heading) -> tuple[str, str]:
 
 
 def short_result(protocol: Protocol[Any], rows: Sequence[Measured]) -> tuple[str, str]:
-    """The main result as a short text, with the agreement of the results, and the verdict of `summary_of`."""
+    """The main result and the number of results that agree, as a short text, and the verdict from `summary_of`."""
     measured = [row for row in rows if isfinite(row.value)]
     if not measured:
         return "", ""
@@ -221,7 +221,7 @@ def _points(path: Path) -> list[dict[str, Any]]:
 
 
 def _figure(found: Found, metadata: Mapping[str, str]) -> Path | None:
-    """The main figure of the protocol if the run has it, else the first picture in its folder; None without one."""
+    """The first figure in the protocol's list that the run has, else the first picture in its folder, else None."""
     try:
         names = load_protocol(metadata.get("protocol", "")).figures
     except RockbenchError:
@@ -231,7 +231,9 @@ def _figure(found: Found, metadata: Mapping[str, str]) -> Path | None:
 
 
 def _specimen(metadata: Mapping[str, str]) -> str:
-    """The block and the first storey of the specimen, and whether it was identified."""
+    """Text with the size of the block, the stiffness of the first storey, and whether they were identified; empty if
+    unknown.
+    """
     try:
         specimen = json.loads(metadata.get("specimen", "{}"))
         identified = json.loads(metadata.get("configuration", "{}")).get("identified")

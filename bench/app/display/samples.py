@@ -1,4 +1,4 @@
-"""Samples of channels of recorded runs: stretches at screen resolution, values at single times, amplitude spectra."""
+"""Samples of channels of recorded runs: intervals at screen resolution, values at given times, amplitude spectra."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -13,9 +13,9 @@ from bench.datafile.reader import DataFile, open_datafile
 from sim.errors import InvalidInput
 
 DRIVE = "drive"
-"""Name of the drive among the channels."""
+"""Channel name of the drive signal."""
 CHUNK = 1_000_000
-"""Number of rows read at a time, because an hour of samples does not fit into memory."""
+"""Number of rows read at a time, because the samples of a long run may not fit into memory."""
 LONGEST = 2_000_000
 """Largest number of samples of a spectrum."""
 SHORTEST = 64
@@ -26,7 +26,7 @@ LINES = 2000
 
 @dataclass(frozen=True)
 class Track:
-    """A channel of run `run` of a file; `name` is shown in the legend."""
+    """A channel of run number `run` in a data file; `name` is shown in the legend."""
 
     path: Path
     run: int
@@ -36,8 +36,9 @@ class Track:
 
 @dataclass(frozen=True, eq=False)
 class Stretch:
-    """Samples of a track from `begin` to `end` [s] as a line through the minimum and the maximum of each part, or
-    through the samples themselves. Both arrays have shape (n,); values are in the channel's unit.
+    """Samples of a track from `begin` to `end` [s since the rig was armed] as a line through the minimum and the
+    maximum of each part, or through the samples themselves. `time` [s] and `values`, in the channel's unit, have shape
+    (n,).
     """
 
     time: NDArray[np.float64]
@@ -50,7 +51,7 @@ class Stretch:
 
 @dataclass(frozen=True, eq=False)
 class Spectrum:
-    """Frequencies [Hz] and amplitudes in the channel's unit, both of shape (n,)."""
+    """Amplitude spectrum of a track: frequencies [Hz] and amplitudes in the channel's unit, both of shape (n,)."""
 
     frequency: NDArray[np.float64]
     amplitude: NDArray[np.float64]
@@ -59,17 +60,18 @@ class Spectrum:
 
 
 def read_stretches(tracks: Sequence[Track], begin: float, end: float, parts: int) -> list[Stretch]:
-    """Samples of the tracks between two times [s] since the rig was armed, each in fewer than 2 x `parts` parts.
+    """Samples of the tracks between two times [s since the rig was armed], reduced to the minimum and the maximum of
+    each of fewer than 2 x `parts` parts.
 
-    An interval with fewer than two samples per part is returned sample by sample. Raises RockbenchError
-    for an unreadable file.
+    An interval of fewer than 2 x `parts` samples is returned sample by sample. Raises RockbenchError for an unreadable
+    file.
     """
     return [_stretch(record, track, begin, end, parts) for record, track in _opened(tracks)]
 
 
 def read_values(tracks: Sequence[Track], times: Sequence[float]) -> list[list[float]]:
-    """The samples of each track nearest to the `times` [s], in the channel's unit; NaN outside the run. Raises
-    RockbenchError for an unreadable file.
+    """For each track, the samples nearest to the `times` [s since the rig was armed], in the channel's unit; NaN
+    outside the run. Raises RockbenchError for an unreadable file.
     """
     found = list[list[float]]()
     for record, track in _opened(tracks):
@@ -87,11 +89,11 @@ def read_values(tracks: Sequence[Track], times: Sequence[float]) -> list[list[fl
 
 
 def read_spectra(tracks: Sequence[Track], begin: float, end: float) -> list[Spectrum]:
-    """Amplitude spectra of all samples of the tracks between two times [s].
+    """Amplitude spectra of all samples of the tracks between two times [s since the rig was armed].
 
-    Missing samples are interpolated, and a track without samples is omitted. A spectrum with more than `LINES`
-    frequencies is reduced to the largest amplitude of each group of them. Raises InvalidInput for too few or too many
-    samples, and RockbenchError for an unreadable file.
+    Missing samples are interpolated, and a track without valid samples is omitted. A spectrum with more than `LINES`
+    frequencies is reduced to the largest amplitude in each group of adjacent frequencies. Raises InvalidInput for too
+    few or too many samples, and RockbenchError for an unreadable file.
     """
     found = list[Spectrum]()
     for record, track in _opened(tracks):
@@ -119,8 +121,8 @@ def read_spectra(tracks: Sequence[Track], begin: float, end: float) -> list[Spec
 def amplitude_spectrum(
     time: NDArray[np.float64], values: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Frequencies [Hz] and amplitudes of equally spaced samples, in their unit, both of shape (n,). The mean is
-    removed; the line of a sine has the height of the sine's amplitude (Hann window).
+    """Frequencies [Hz] and amplitudes of equally spaced samples, in the unit of the samples, both of shape (n,). The
+    mean is removed, and a Hann window is applied; the peak of a sine at one of the frequencies is its amplitude.
     """
     window = np.hanning(values.size)
     lines: NDArray[np.float64] = np.abs(np.fft.rfft((values - values.mean()) * window)) * 2.0 / window.sum()
@@ -128,7 +130,7 @@ def amplitude_spectrum(
 
 
 def _opened(tracks: Sequence[Track]) -> Iterator[tuple[DataFile, Track]]:
-    """Every track with its open file; a file is opened once for adjacent tracks."""
+    """Every track with its open file, grouped by file, so that each file is opened once."""
     for path in dict.fromkeys(track.path for track in tracks):
         with open_datafile(path) as record:
             for track in tracks:
@@ -141,7 +143,7 @@ def _rows(record: DataFile, track: Track) -> range:
 
 
 def _part(record: DataFile, track: Track, begin: float, end: float) -> slice:
-    """Rows of the samples between two times."""
+    """Rows of the file with the samples between two times [s since the rig was armed]."""
     rows, rate = _rows(record, track), record.sample_rate
     first = rows.start + min(max(int(begin * rate), 0), len(rows))
     last = rows.start + min(max(int(np.ceil(end * rate)) + 1, 0), len(rows))

@@ -27,7 +27,7 @@ from bench.events import State, StateChanged
 from drivers.clock import now
 
 STALE = 2.0
-"""Age above which the safety inputs are unknown [s]."""
+"""Age of the last reading [s] above which the safety inputs are shown as unknown."""
 Link = Literal["starting", "linked", "no link", "over"]
 """State of a connection, as in `bench.app.ipc.client`."""
 
@@ -35,7 +35,7 @@ Link = Literal["starting", "linked", "no link", "over"]
 class SessionState:
     """State of one session, updated from its messages; without a session, the state before the first run.
 
-    attached : session of another client that is displayed; None for an own session.
+    attached : session of another client that is displayed; None for a session that this client has started.
     """
 
     def __init__(self, attached: RunningSession | None = None) -> None:
@@ -71,7 +71,7 @@ class SessionState:
         return None if self._inputs_received is None else now() - self._inputs_received
 
     def inputs_line(self, *, running: bool) -> tuple[str, Level]:
-        """The safety inputs as text, and its level; values older than `STALE` are shown as unknown."""
+        """Text of the safety inputs and its level (colour); readings older than `STALE` are shown as unknown."""
         age, wired = self.inputs_age, self.inputs
         if not running:
             return texts.INPUTS_UNREAD, "calm"
