@@ -77,13 +77,13 @@ def check_folder(folder: Path, results: Iterable[str]) -> None:
                 raise InvalidInput(
                     "--out",
                     str(folder),
-                    f"it already contains {name}; results are never overwritten, so choose another folder",
+                    f"the folder already contains {name}; results are never overwritten, so choose another folder",
                 )
         while not existing.exists() and existing != existing.parent:
             existing = existing.parent
         if not existing.is_dir():
             raise InvalidInput("--out", str(folder), f"{existing} is a file; choose a folder")
-        # permission bits are not reliable on every file system
+        # a trial file, because permission bits are not reliable on every file system
         with tempfile.TemporaryFile(dir=existing):
             pass
     except OSError as error:

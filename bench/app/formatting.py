@@ -26,7 +26,7 @@ def setpoint(value: float | None) -> str:
 
 
 def plus_minus(value: float | None, uncertainty: float | None) -> str:
-    """A value and its uncertainty, both rounded to the uncertainty's second digit: `0.8263 ± 0.0041`."""
+    """A value and its uncertainty, rounded to the second significant digit of the uncertainty: `0.8263 ± 0.0041`."""
     if value is None or not isfinite(value) or uncertainty is None or not isfinite(uncertainty) or uncertainty <= 0:
         return number(value)
     places = min(max(1 - floor(log10(uncertainty)), 0), 6)

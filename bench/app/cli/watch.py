@@ -73,7 +73,7 @@ def live_page(page: PageOptions) -> Generator[None]:
         child.write(json.dumps(assignment).encode() + b"\n")
         line = child.output.readline()
         if not line:
-            raise RockbenchError("the process of the live page ended without an error message; start the run without --watch")
+            raise RockbenchError("the process of the live page ended without a message; start the run without --watch")
         answer = json.loads(line)
         if "url" not in answer:
             raise InvalidInput(answer["item"], answer["value"], answer["allowed"])

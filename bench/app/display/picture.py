@@ -1,5 +1,4 @@
-"""Picture of the specimen: table, frame, spring, block and laser beams as shapes drawn to scale, with magnified motion.
-"""
+"""Picture of the specimen: table, frame, spring, block and laser beams as shapes to scale, with magnified motion."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -73,7 +72,7 @@ def pose_of(
     frame = specimen.frame
     first, second = float(motion[U_1]), float(motion[U_2])
     if arrangement.pull:
-        # the zero of the signals is the pulled position: storey 2 held at `pull`, storey 1 displaced by the static force
+        # the signals are zero in the pulled position: storey 2 held at `pull`, storey 1 displaced by the static force
         first += frame.k2 / (frame.k1 + frame.k2) * arrangement.pull
         second += arrangement.pull
     if arrangement.face is not None:

@@ -114,7 +114,7 @@ class SessionState:
             return bench_status("no link", scene.state, scene.reason, self._quiet)
         planning = scene.preparing and scene.state is State.IDLE
         if planning and (link == "linked" or (link == "no link" and lives)):
-            # no rig is open: a busy computer may delay the messages of a process that plans
+            # the rig is not open yet; while the plan is computed, a busy computer may delay the messages
             late = "" if link == "linked" else f" ({texts.PLANNING_LATE.format(age=silence)})"
             return Status(texts.PLANNING, f"{scene.reason}{late}", "wait", "ring")
         # the reason for the change of state no longer applies once the plan continues
@@ -132,7 +132,7 @@ class SessionState:
                         self.question = None
                 return scene.update(event)
             case Beat():
-                # correct even if the event with the change of state was lost
+                # the heartbeat gives the correct state even if the event with the change of state was lost
                 scene.state, scene.time = message.state, message.time
                 if not scene.preparing:
                     scene.reason = message.reason

@@ -38,8 +38,8 @@ class Status:
 def bench_status(
     link: Literal["none", "starting", "linked", "no link", "over"], state: State, reason: str, silence: float
 ) -> Status:
-    """Status to be displayed for a state and a connection; `silence` is the time since the last message [s]. Without a
-    connection, the last known state is not shown.
+    """Status to be displayed for a state and a connection; `silence` is the time since the last message [s]. While the
+    connection is missing, the status names its loss instead of the last known state.
     """
     match link:
         case "none":

@@ -24,7 +24,7 @@ ATTACHING_WHY = "waiting for the session: {run}"
 PLANNING_LATE = "no message for {age:.0f} s: the computer is busy; nothing is armed"
 ATTACHED_RUN = "{owner}'s run: {run}."
 ATTACHED_READ_ONLY = "STOP works here; {owner} answers questions and controls the ramp-out."
-ATTACHED_CONTROLS = "Its window was lost; answer its questions in this window."
+ATTACHED_CONTROLS = "The connection of its owner was lost; answer its questions in this window."
 OWNERS = {"window": "another window", "terminal": "a terminal"}
 UNNAMED = "operator at the window"
 OWN_RUN = "This window's run: {run}."
@@ -57,7 +57,7 @@ NO_INPUTS = "none configured"
 INPUT_GOOD, INPUT_OPEN, INPUT_UNKNOWN = "good", "OPEN", "unknown"
 INPUTS_UNREAD = "read only during a run"
 INPUTS_TIP = (
-    "Second contacts of the emergency stop, the over-travel switches and the amplifier. They are read "
+    "Auxiliary contacts of the emergency stop, the over-travel switches and the amplifier. They are read "
     "twice a second during a run, and shown as unknown after {stale:g} s without a reading."
 )
 
@@ -90,7 +90,8 @@ OPERATOR_TIP = "Name of the operator; stored in the data file."
 DEFAULT_TIP = "If empty: {default}."
 MARGINS = ("quantity", "unit", "demand", "at 95 %", "limit", "margin at 95 % [%]", "where")
 MARGIN_TIP = (
-    "{margin:.1f} % for the nominal specimen; at least {likely:.1f} % for 95 % of the specimens within the uncertainty."
+    "Margin {margin:.1f} % for the nominal specimen, and at least {likely:.1f} % with a probability of 95 %, given the "
+    "uncertainty of the specimen's parameters."
 )
 TIME_AND_DISK = "Expected duration {duration}. Disk: up to {needed:.0f} MB needed, {free:.0f} MB free."
 TIGHTEST = "Tightest: {name}, limited by {owner}."
@@ -136,15 +137,15 @@ NO_CHANGE = "< 0.01 %"
 SENSORS = ("table acceler.", "table displ.", "laser 1", "laser 2")
 STEADY_TIP = (
     "For each sensor, the mean cycles of two windows of {window} cycles are compared; steady means that they agree "
-    "within a third of {tolerance:g} % (settle tolerance). Computed from the traces; the run evaluates the samples."
+    "within a third of {tolerance:g} % (settle tolerance). This display uses the traces; the run uses the samples."
 )
-LOST_PARTS, AND = ("{n} events", "{n} blocks of traces"), " and "
-LOST = "{what} were not shown; the file contains all of them."
+LOST_PARTS, AND = ("{n} event(s)", "{n} block(s) of traces"), " and "
+LOST = "Not shown: {what}; the file contains all of them."
 TRACES_OLD = "Traces and picture are not live: the newest sample is {age} old."
 DATA_AGE = "newest sample {age:.1f} s old"
 FRAME = "Bare frame: measured"
 FRAME_ONLY = "Frame: measured. Block (dashed): angle unknown"
-BLOCK_BY_LASER = "Storey 1: measured. Block: by laser 2, {height:.0f} mm above the table. Storey 2: unknown"
+BLOCK_BY_LASER = "Storey 1: measured. Block: measured by laser 2, {height:.0f} mm above the table. Storey 2: unknown"
 NOT_LIVE = "not live for {age:.0f} s"
 NOT_LIVE_AXIS = "seconds before the newest sample, " + NOT_LIVE
 ON_BLOCK = {
@@ -156,7 +157,7 @@ FRAME_AND_BLOCK = "Frame: measured. Block: model, driven by the measured table m
 FACTOR = "magnification"
 FACTOR_TIP = "Magnification of the motion; also with the mouse wheel, or the keys + and −, on the picture."
 
-OPEN, OPEN_TIP = "Open a file …", "Opens the campaign.h5 of a run (Ctrl+O)."
+OPEN, OPEN_TIP = "Open a file …", "Opens the data file (campaign.h5) of a run (Ctrl+O)."
 OPEN_BESIDE = "{why}; a path can be typed at any time"
 FILE_SUMMARY = "{path}\n{start}, {status}: {summary} ({length} of samples)"
 RUN_FILES = "campaign (*.h5)"
@@ -169,7 +170,7 @@ NO_FIGURE = "The run wrote no figure."
 POINT_TITLES = ("point", "quantity", "measured ± U", "predicted ± U", "difference", "verdict")
 POINT_TIPS = (
     "point of the campaign",
-    "measured quantity; All fields shows every field of the file",
+    'measured quantity; "All fields" shows every field of the file',
     "measured value and expanded uncertainty (k = 2)",
     "predicted or nominal value; its expanded uncertainty (k = 2), or the interval expected for the measured value",
     "measured minus predicted",
@@ -242,7 +243,7 @@ RUNS_AGAINST_TIP = "Makes the selected run the reference of the comparison (Ctrl
 RUNS_FOLDER, RUNS_FOLDER_TIP = "Folder …", "Shows the runs in another folder and in the folders below it."
 RUNS_BACK, RUNS_BACK_TIP = "Opened run", "Returns to the opened run (Ctrl+B)."
 RUNS_ALL, RUNS_ALL_TIP = "All runs", "Shows the list of all runs (Ctrl+B)."
-RUNS_HELD = "Files of the list are opened after the run."
+RUNS_HELD = "A run is under way: open files from the list after its end."
 RUNS_COUNT = "{shown} of {all} files in {folder}"
 RUNS_REFERENCE = "reference: {name}, compared: {n}"
 RUNS_READING = "reading {n}"
@@ -256,8 +257,8 @@ USE_TIP = (
 )
 USE_BACK = "Configured values"
 USE_BACK_TIP = "Uses the values of the configuration again for all following runs (Ctrl+Shift+U)."
-USED = "Runs now use {files}. Configured values undoes this."
-FURTHER, FURTHER_TIP = "and …", "Adds channels, drawn in the plot of the first or, if they have another unit, below it."
+USED = 'Runs now use {files}. "Configured values" undoes this.'
+FURTHER, FURTHER_TIP = "and …", "Adds channels: in the plot of the first channel or, for another unit, below it."
 OVERLAY, OVERLAY_TIP = "ticked runs", "Also draws the same channels and run of the other ticked files."
 CURSORS, CURSORS_TIP = "cursors", "Shows two cursors, A and B, to drag; the line below gives the samples at both."
 SPECTRUM = "spectrum"
@@ -347,7 +348,7 @@ PRESET, PRESET_HINT = "Presets", "preset: select or name"
 PRESET_TIP = "Select a preset to fill the form with it, or type a name to save the values of the form."
 PRESET_SAVE, PRESET_SAVE_TIP = (
     "Save",
-    "Saves the values of the form as the named preset; an existing one that was not loaded, after a second press.",
+    "Saves the values of the form as the named preset. To replace a preset that was not loaded, press it twice.",
 )
 PRESET_DELETE, PRESET_DELETE_TIP = "Delete", "Deletes the file of the named preset; the form keeps its values."
 PRESET_LOADED, PRESET_SAVED, PRESET_DELETED = "Preset {name}.", "Saved: {path}", "Deleted: {name}"
@@ -397,7 +398,7 @@ QUEUE_REFUSED = "the plan of test {number} was refused."
 QUEUE_FILE = "Saved in {path}; `rockbench queue` runs the same file."
 QUEUE_UNKEPT = "Not saved: the queue is lost when this window closes."
 QUEUE_OWNER = "the operator's window"
-QUEUE_GONE = "The edited test has begun or was skipped or removed, so it was not changed."
+QUEUE_GONE = "The edited test has begun, or was skipped or removed, so it was not changed."
 QUEUE_GONE_DID = "The queue is unchanged."
 QUEUE_GONE_NOW = "The edited values are still on the Protocol page: check and add them, or edit the test again."
 QUEUE_DID = "The queue is paused. The pending tests are unchanged in the file."
@@ -489,13 +490,13 @@ LIVE_CHECK_MARKS = {
     "pending": ("…", "pending", "calm"),
     "other": ("·", "without verdict", "calm"),
 }
-"""Mark, word and level of a line of the check on the Run page."""
+"""Mark, word and level (colour) of a check line on the Run page, by its verdict."""
 LIVE_CHECK_COUNT = "{n} {verdict}"
 CLAMPED = {
     "table_locked": "Table clamped.",
     "frame_clamped": "Storeys clamped to the table.",
     "block_clamped": "Block clamped to the table.",
 }
-"""Text below the picture by field of `bench.app.display.status.Arrangement`."""
+"""Text below the picture, by the field of `bench.app.display.status.Arrangement` that is True."""
 FRAME_BY_LASERS = "Frame: measured"
 LIVE_FAILED = "{error}. The run is not affected."

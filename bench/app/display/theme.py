@@ -1,11 +1,13 @@
-"""Colours of the displays after Okabe and Ito, on a light and a dark ground."""
+"""Display colours for a light and a dark background, based on the palette of Okabe and Ito."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
 class Theme:
-    """Colours as #rrggbb; `lines` are those of curves, with enough contrast on `ground`."""
+    """Colours as #rrggbb. `ground` is the background, `calm` to `alarm` are those of the levels, and `lines` those of
+    curves, with enough contrast on the background.
+    """
 
     ground: str
     raised: str

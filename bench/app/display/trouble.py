@@ -7,7 +7,7 @@ from bench.guard.sensors import TIMING
 from sim.errors import Cause, CauseCode
 
 QUIET = ("completed", "stopped")
-"""Endings that require no action."""
+"""Statuses of an ended run that require no action."""
 
 
 RUN_ENDED = "Run {status}: {reason}."
@@ -30,16 +30,16 @@ NOW_LOOK = (
     "the next test."
 )
 NOW_LIMIT = (
-    "A limit was exceeded ({subject}): inspect specimen and sensors before the next test. If they are in order, "
-    "check the margins of the plan and reduce the motion."
+    "A limit was exceeded ({subject}): inspect the specimen and the sensors before the next test. If they are in "
+    "order, check the margins of the plan and reduce the motion."
 )
 NOW_LATE = (
     "The computer or the link to a device was too slow ({subject}); the motion was within its limits. "
     "Close other programs, check cables and network, then start again."
 )
 _NOW_DEVICE = (
-    "Check power and cables of the device named above, then search for devices and run the loop check on the Setup "
-    "page."
+    "Check the power supply and the cables of the device named above, then search for devices and run the loop check "
+    "on the Setup page."
 )
 _NOW_DISK = (
     'Free disk space, or enter a folder on another disk in the field "Results in". `rockbench file info` describes '
@@ -53,7 +53,8 @@ NOW = {
     ),
     "declined": "Complete the task, or remove it from the plan, then start again.",
     "safety_input": (
-        "Find the cause at the bench and reset the input there. In the next run, the header must show that it is good."
+        "Find the cause at the bench and reset the safety input there. In the next run, the header must show it as "
+        "good."
     ),
     "limit": NOW_LIMIT,
     "disk": _NOW_DISK,
@@ -64,7 +65,7 @@ NOW = {
     "device_not_found": _NOW_DEVICE,
     "command_refused": _NOW_DEVICE,
 }
-"""Next step by code of the cause; NOW_LOOK for all other codes."""
+"""Next step by code of the cause. For all other codes, it is NOW_LOOK, or NOW_REFUSED if the run was not started."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +79,7 @@ class Trouble:
 
 
 def trouble_of(ended: Ended | Refused, *, driven: bool) -> Trouble | None:
-    """The fault report of a run, None if it ended without a fault. `driven` is whether the rig was armed in the run."""
+    """The fault report of a run; None if it ended without a fault. `driven` is whether the rig was armed in the run."""
     if isinstance(ended, Refused):
         return _of_refusal(ended, driven=driven)
     if ended.status in QUIET:

@@ -1,4 +1,4 @@
-"""Contents of an export, independent of the format, and the export formats: entry points of the group
+"""Contents of an export, independent of its format, and the export formats, which are the entry points of the group
 `rockbench.exports`.
 """
 
@@ -172,7 +172,7 @@ class ExportFormat:
     """An export format: writes open files for other programs. Its name for `--to` is that of the entry point.
 
     title : name shown in the window.
-    write : fills a new folder.
+    write : writes the contents to a new folder.
     check : raises InvalidInput, before the folder is created, for contents that the format cannot represent.
     library : required module of the extra `export`; empty for none.
     """

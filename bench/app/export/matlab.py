@@ -34,7 +34,7 @@ def check(content: Content) -> None:
 
 
 def write(content: Content, folder: Path) -> None:
-    """Write run-<number>.mat with a column for each signal, and tables.mat.
+    """Write run-<number>.mat with a variable for the time and each signal (column vectors), and tables.mat.
 
     `units` and `channels` have a field for each variable, so that `units.laser_1` is the unit of `laser_1`; a name that
     MATLAB does not allow is changed, and `channels.laser_1.name` has the original.
@@ -72,7 +72,7 @@ def write(content: Content, folder: Path) -> None:
 
 
 def variables(names: Sequence[str], taken: Iterable[str] = ()) -> list[str]:
-    """Valid MATLAB names, distinct from each other and from those in `taken`."""
+    """Valid MATLAB names for `names`, in the same order, distinct from each other and from those in `taken`."""
     found: list[str] = []
     for name in names:
         plain = re.sub(r"[^A-Za-z0-9_]", "_", name)[:LONGEST]
@@ -119,7 +119,7 @@ def _units(columns: Sequence[TableColumn]) -> dict[str, str]:
 
 
 def _values(column: TableColumn) -> NDArray[Any]:
-    """Numbers and Booleans (0, 1) as doubles, NaN where absent; strings as a cell array."""
+    """Numbers and Booleans (0, 1) as doubles, NaN where absent; strings as a cell array, empty where absent."""
     if column.kind == "text":
         cells = np.empty(len(column.values), dtype=object)
         cells[:] = ["" if value is None else value for value in column.values]

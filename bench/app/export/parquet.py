@@ -13,7 +13,7 @@ from bench.app.export.format import Content, ExportFormat, Signal, TableColumn
 
 def write(content: Content, folder: Path) -> None:
     """Write run-<number>.parquet in pieces, and <table>.parquet. Absent values of tables are null."""
-    # `Any`: an optional dependency without type information
+    # `Any` because pyarrow is an optional dependency without type information
     arrow: Any = import_module("pyarrow")
     parquet: Any = import_module("pyarrow.parquet")
     about = {name: str(value) for name, value in content.info.items()}

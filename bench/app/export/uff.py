@@ -22,7 +22,7 @@ from bench.datafile.series import RecordedRun
 from sim.errors import InvalidInput
 
 MOST_PARTS = 200
-"""Maximum number of parts of a signal; if there are more, the format is unsuitable."""
+"""Maximum number of parts of a signal; the export of a signal with more parts is refused."""
 
 _KINDS = {"m": 8, "m/s": 11, "m/s2": 12, "N": 13}
 """Specific data type of the ordinate by unit; 0 (unknown) for other units."""
@@ -32,7 +32,9 @@ _LABEL, _LINE = 20, 80
 
 
 def write(content: Content, folder: Path) -> None:
-    """Write run-<number>.uff, and the tables as text. Raises InvalidInput for a signal in too many parts."""
+    """Write run-<number>.uff, and the tables as text. Raises InvalidInput for a signal with more than `MOST_PARTS`
+    parts.
+    """
     pyuff: Any = import_module("pyuff")  # an optional dependency without type information
     for run in content.runs:
         with (folder / f"run-{run.number}.uff").open("wb") as file:
@@ -49,7 +51,7 @@ def write(content: Content, folder: Path) -> None:
 
 
 def _append(pyuff: Any, file: Any, dataset: dict[str, Any], folder: Path) -> None:
-    """Append a dataset that was written to a separate file first, because pyuff rereads the whole file after each
+    """Append a dataset. It is first written to a separate file, because pyuff rereads the whole file after each
     addition.
     """
     with tempfile.TemporaryDirectory(dir=folder, prefix=".part-") as parts:
@@ -72,13 +74,13 @@ def _units(pyuff: Any) -> dict[str, Any]:
 def _parts(signal: Signal, values: NDArray[Any], time: NDArray[np.float64], rate: float) -> Iterator[tuple[int, int]]:
     """Uninterrupted parts of the signal as index ranges [start, stop) of at least two samples each."""
     good = np.isfinite(values)
-    # the sample after a gap begins a part
+    # the sample after a gap in time begins a new part
     follows = np.concatenate(([False], np.diff(time) < 1.5 / rate))
     inside = good & np.concatenate(([False], good[:-1])) & follows
     starts = np.flatnonzero(good & ~inside)
     if starts.size > MOST_PARTS:
-        gaps = f"{signal.name} is interrupted in {starts.size} places"
-        raise InvalidInput("--to", "uff", f"{gaps}, which UFF cannot represent: use --to parquet, or --raw")
+        gaps = f"missing samples divide {signal.name} into {starts.size} parts"
+        raise InvalidInput("--to", "uff", f"{gaps}, too many for UFF: use --to parquet, or --raw")
     ends = np.flatnonzero(good & ~np.concatenate((inside[1:], [False]))) + 1
     for start, stop in zip(starts.tolist(), ends.tolist(), strict=True):
         if stop - start > 1:

@@ -21,7 +21,7 @@ BELOW_NORMAL = 0x4000
 
 class Reader(QObject):
     """Calls functions in a thread, one at a time; `found` emits the result of the last call only, in the window's
-    thread. The functions may only compute; the slots of `found` draw.
+    thread. The functions must not use widgets, which the slots of `found` may update.
     """
 
     found = Signal(object)
@@ -46,7 +46,7 @@ class Reader(QObject):
             if self._busy:
                 return
             self._busy = True
-        # a pool of Qt waits for its threads when it is deleted, for ever if the window's thread holds Python's lock
+        # no QThreadPool: its deletion waits for its threads, for ever if the window's thread holds Python's GIL
         Thread(target=self._work, daemon=True).start()
 
     def _work(self) -> None:

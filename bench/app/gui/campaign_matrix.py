@@ -17,7 +17,7 @@ from bench.protocol import Axis, Protocol
 
 
 class MatrixView(QTableWidget):
-    """Table of the points; hidden for a protocol whose points are not known beforehand."""
+    """Table of the points; hidden for a protocol whose points do not form a matrix of two parameters."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()

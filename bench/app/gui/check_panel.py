@@ -84,7 +84,9 @@ class CheckPanel(QWidget):
         self._refresh()
 
     def use(self, configuration: BenchConfiguration) -> None:
-        """Use this bench; on a real bench, the check asks the operator."""
+        """Use this configuration, and clear the table. If the bench cannot perform the operator tasks itself, the check
+        always asks the operator.
+        """
         self._configuration = configuration
         self.person.setChecked(not configuration.serves_itself)
         self.person.setEnabled(configuration.serves_itself)

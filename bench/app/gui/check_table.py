@@ -21,7 +21,7 @@ ROW = 22
 
 
 class CheckTable(QWidget):
-    """The checks in order, below the number of checks with each verdict."""
+    """Table of the checks in order; a line above it states how many have each verdict."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -50,7 +50,7 @@ class CheckTable(QWidget):
         self.show_checks(self._shown)
 
     def show_checks(self, checklist: Checklist) -> None:
-        """Show these lines, and scroll to the last one that is not pending."""
+        """Show these checks, and scroll to the last one that is not pending."""
         self._shown, checks = checklist, checklist.checks
         counted = [sum(each.verdict == verdict for each in checks) for verdict in texts.LIVE_CHECK_MARKS]
         words = (

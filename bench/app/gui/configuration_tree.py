@@ -32,7 +32,7 @@ class ConfigurationTree(QTreeWidget):
         self.header().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
 
     def use(self, configuration: BenchConfiguration) -> None:
-        """Show a configuration, without the tables of other backends."""
+        """Show a configuration, without the tables of the rig backends that it does not use."""
         self.clear()
         unused = {"simulation", "hardware", "rig"} - {configuration.table}
         values, groups = list[QTreeWidgetItem](), list[QTreeWidgetItem]()
@@ -68,8 +68,8 @@ class ConfigurationTree(QTreeWidget):
 
 
 def _line(of: Declared, value: object) -> QTreeWidgetItem:
-    """Item of a key, with those of the keys below it; its first column stores whether any of their values differs from
-    the default.
+    """Item of a key, with child items for the keys below it; its first column stores whether the value, or any value
+    below it, differs from the default.
     """
     changed = value != of.default
     item = QTreeWidgetItem([of.name, "", ""])

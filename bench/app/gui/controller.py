@@ -1,6 +1,6 @@
 """The connection between session and widgets: converts messages into state and signals, and user input into requests.
 
-It is independent of the protocols: the command line offers the same operations.
+It contains nothing specific to a protocol, and no operation that the command line does not offer.
 """
 
 from collections import deque
@@ -34,11 +34,10 @@ PERIOD = 28
 """Redraw interval [ms], for 35 redraws per second; also the longest interval between checks of the connection."""
 
 BUDGET = 0.02
-"""Maximum time for handling messages in one iteration of the main loop [s]; the rest waits for the next iteration."""
+"""Maximum time for handling messages in one iteration of the main loop [s]; the others wait for the next iteration."""
 
 DELIBERATE = 0.7
-"""Time after a press of STOP during which further presses are ignored [s], so that a double click counts as one press.
-"""
+"""Time after the first press of STOP during which further presses are ignored [s], because of double clicks."""
 
 
 class Controller(QObject):
@@ -74,7 +73,7 @@ class Controller(QObject):
         self.session = SessionState()
         """State of the current or last run."""
         self.elsewhere: RunningSession | None = None
-        """A session under way on this computer to which this window is not attached."""
+        """A session under way on this computer to which this window is not attached; None if there is none."""
         self.held = ""
         """Reason why only the queue may start a run; empty if there is none."""
         self.latched = False
@@ -175,8 +174,8 @@ class Controller(QObject):
         self.changed.emit()
 
     def press_stop(self) -> None:
-        """Handle a press of STOP, which latches: the first press ramps the output quickly to zero; another one, at
-        least `DELIBERATE` later, cuts the enable line.
+        """Handle a press of STOP, which latches: the first press ramps the output quickly to zero; another press, at
+        least `DELIBERATE` seconds after the first, cuts the enable line.
         """
         first = not self.latched
         if first:

@@ -12,7 +12,7 @@ from bench.app.gui.score_strip import ScoreStrip
 
 
 class FigureView(QWidget):
-    """One of the figures, as large as the space allows, selected by its name; below it the strip of E_n."""
+    """The selected figure, as large as the space allows, above the strip of the normalised errors E_n."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()

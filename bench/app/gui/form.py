@@ -106,7 +106,7 @@ class Form(QWidget):
         return typed
 
     def _data(self) -> dict[str, Any]:
-        """Plain data as in a file; empty fields are omitted."""
+        """The values as plain data, as if read from a file; empty fields are omitted."""
         return read_fields(self._model, self.typed())
 
 
@@ -126,7 +126,7 @@ def _field(entry: Declared, value: Any) -> Field:
         choice.addItems([*([""] if entry.optional else []), *entry.choices])
         chosen = "" if _absent(value) else str(getattr(value, "value", value))
         if chosen and choice.findText(chosen) < 0:
-            # shown with the reason why it is invalid
+            # an invalid value is shown as well, and its error message states the reason
             choice.addItem(chosen)
         choice.setCurrentText(chosen)
         return choice
@@ -143,7 +143,7 @@ def _typed(entry: Declared, value: Any) -> str:
 
 
 def default_text(entry: Declared) -> str:
-    """The default as typed; empty if there is none."""
+    """The default as the user would type it; empty if there is none."""
     return _typed(entry, entry.default)
 
 
@@ -152,7 +152,7 @@ def _absent(value: object) -> bool:
 
 
 def _exactly(value: object) -> str:
-    """A value as typed, with all its digits."""
+    """A value as the user would type it, with all its digits."""
     text = as_typed(value)
     return repr(value) if isinstance(value, float) and float(text) != value else text
 
@@ -207,7 +207,9 @@ class RunOptions(QWidget):
         self.use(configuration)
 
     def use(self, configuration: BenchConfiguration) -> None:
-        """Reset real time and questions to the defaults of this bench: on a real bench the operator answers."""
+        """Use this configuration, and reset real time and questions to its defaults: the operator answers unless the
+        bench can perform all operator tasks itself.
+        """
         self._configuration = configuration
         self.realtime.setChecked(True)
         self.realtime.setEnabled(not configuration.real_time_only)

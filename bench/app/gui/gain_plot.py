@@ -1,6 +1,8 @@
 # pyright: reportUnknownMemberType=false, reportUnknownVariableType=false, reportUnknownArgumentType=false
 # pyright: reportMissingTypeStubs=false
-"""The gain spectrum, or the gain curves under records: predicted lines and measured points."""
+"""Plot of the gain over the frequency of a sine, or over the stiffness for earthquake records: predicted lines and
+measured points.
+"""
 
 from collections.abc import Mapping, Sequence
 from math import ceil, floor, isfinite, log10
@@ -31,7 +33,7 @@ GROUND = 150
 
 
 class GainPlot(pg.PlotWidget):
-    """One colour and dash per stiffness or record, one symbol per run.
+    """Gain plot with one colour and line style for each stiffness or record, and one symbol for each run.
 
     The gain axis of a spectrum is logarithmic, so that 1/5 and 5 are equally visible.
     """
@@ -62,7 +64,7 @@ class GainPlot(pg.PlotWidget):
 
     @property
     def measured(self) -> list[tuple[float, float]]:
-        """Abscissa [SI] and gain of the points that are drawn."""
+        """Abscissa, in its SI unit, and gain of each drawn point that has a gain."""
         return [(mark.x, mark.gain) for mark in self._marks if mark.gain is not None]
 
     def use_theme(self, theme: Theme) -> None:
@@ -83,7 +85,7 @@ class GainPlot(pg.PlotWidget):
     def predict(self, prediction: Table) -> None:
         """Replace the content by predicted lines; a prediction without gains leaves the plot empty."""
         self.clear()
-        # legend entries without a curve would remain
+        # `clear` keeps the legend entries that do not belong to a curve
         self._legend.clear()
         self.setToolTip("")
         self._prediction, self._added = prediction, []
@@ -174,7 +176,7 @@ class GainPlot(pg.PlotWidget):
         return self._kind == "spectrum"
 
     def _place(self, gain: float) -> float:
-        """Axis coordinate of a gain for a single item, since pyqtgraph transforms only lines on a logarithmic axis."""
+        """Axis coordinate of a gain. Lines do not need it: pyqtgraph transforms them for a logarithmic axis."""
         return log10(gain) if self._log else gain
 
     def _draw_spreads(self) -> None:
@@ -227,7 +229,7 @@ class GainPlot(pg.PlotWidget):
 
 
 def evenly(low: float, high: float) -> list[tuple[float, str]]:
-    """About four evenly spaced gains between two gains, with their positions on a logarithmic axis."""
+    """Ticks at about four evenly spaced gains from `low` to `high`: position on a logarithmic axis, and label."""
     step = round_down((high - low) / 3.0)
     gains = [step * k for k in range(ceil(low / step), floor(high / step) + 1)]
     return [(log10(gain), f"{gain:g}") for gain in gains if gain > 0.0]

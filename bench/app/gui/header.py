@@ -36,7 +36,7 @@ class StopButton(QPushButton):
         self.setObjectName("stop")
         self.setAccessibleName(texts.STOP_NAME)
         self.setToolTip(f"{texts.STOP_TIP.format(after=DELIBERATE)}\n{texts.GUARD}")
-        # a filter handles its keys: the space bar must not press it by accident, and a click must not move the focus
+        # `StopFilter` handles F12; without focus, the space bar cannot press the button by accident
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         # acts on press, not on release
         self.pressed.connect(controller.press_stop)
@@ -227,7 +227,7 @@ def application() -> QApplication:
 
 
 def _set_property(part: QWidget, name: str, value: str) -> None:
-    """Set a property used as a selector in the style sheet, and update the style of the child widgets."""
+    """Set a property that the style sheet uses as a selector, and update the style of the widget and its children."""
     if part.property(name) != value:
         part.setProperty(name, value)
         for each in (part, *part.findChildren(QWidget)):

@@ -1,4 +1,4 @@
-"""Help on a parameter of a protocol: its entry in the reference, and the page."""
+"""Help on a parameter of a protocol: its description, and a button that opens the reference page."""
 
 from pathlib import Path
 from typing import Any
@@ -16,12 +16,12 @@ from bench.document.typography import unit_text
 from bench.protocol import Protocol
 
 PAGE = Path("reference", "protocols.md")
-"""Page of the parameters, below the folder of the pages."""
+"""Reference page of the parameters, relative to the documentation folder."""
 
 
 def reference_page(protocol: str, root: Path | None = None) -> tuple[str, QUrl | None]:
-    """Path of the reference of a protocol's parameters, and the address of the page in the built site or in the
-    checkout at `root`; None for an installation without pages.
+    """Path of the reference page, with the section on a protocol's parameters, and the URL of this section in the built
+    site or in the source tree at `root`. The URL is None for an installation without pages.
     """
     root = Path(__file__).parents[3] if root is None else root
     section = f"parameters-of-{protocol}"
@@ -51,7 +51,7 @@ def reference_text(entry: Declared) -> list[str]:
 
 
 class HelpPanel(QWidget):
-    """The help on one parameter at a time; no network is needed."""
+    """Panel with the help on one parameter, which needs no network."""
 
     closed = Signal()
 

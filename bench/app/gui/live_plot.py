@@ -18,7 +18,7 @@ from bench.app.gui.widgets import colour_axes
 from bench.live_view import Panel
 
 INSIDE = (60, 8, 8, 44)
-"""Distances of the sentence from the edges of the plot [px], which leave the axes free."""
+"""Distances of the notice from the edges of the plot [px], so that it does not cover the axes."""
 KEYS = {"line": "──", "points": "●", "predicted": "╌╌"}
 """Keys of the legend by style."""
 LEGEND = 4
@@ -26,7 +26,7 @@ LEGEND = 4
 
 
 class LivePlot(QWidget):
-    """Axes with the curves of a panel; until there is a result, a sentence states what will appear."""
+    """Axes with the curves of a panel; until there is a result, a notice states what will appear."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -48,7 +48,7 @@ class LivePlot(QWidget):
         grid.setSpacing(0)
         grid.setRowStretch(1, 1)
         grid.addWidget(self.heading, 0, 0)
-        # the sentence lies over the plot
+        # both in the same cell, so that the notice is drawn over the plot
         for part in (self.plot, self.notice):
             grid.addWidget(part, 1, 0)
         self.use_theme(theme)
@@ -77,14 +77,14 @@ class LivePlot(QWidget):
         for curve in figure.curves:
             self._draw(curve, colours.get(id(curve), theme.faint))
         keys = (f'<span style="color: {colours[id(curve)]}">{KEYS[curve.style]}</span>' for curve in drawn)
-        # lines break between the curves only
+        # no-break spaces, so that the legend wraps between curves only
         names = (escape(curve.name).replace(" ", "&nbsp;") for curve in drawn)
         entries = [f"{key}&nbsp;{name}" for key, name in zip(keys, names, strict=True)]
         shown = " &nbsp;".join(entries[:LEGEND] + ["…"] * (len(entries) > LEGEND))
         title = f"<b>{escape(figure.title)}</b> &nbsp;" if figure.title else ""
         self.heading.setText(f'<span style="font-size: 8pt">{title}{shown}</span>')
         self.heading.setToolTip("\n".join(curve.name for curve in drawn) if len(entries) > LEGEND else "")
-        # predicted lines may pass behind the sentence
+        # with a background, because predicted lines may pass behind the notice
         self.notice.setText(f'<span style="background-color: {theme.raised}">{escape(figure.notice)}</span>')
         self.notice.setVisible(bool(figure.notice))
         item.enableAutoRange()
@@ -99,7 +99,7 @@ class LivePlot(QWidget):
             return
         style = Qt.PenStyle.DashLine if curve.style == "predicted" else Qt.PenStyle.SolidLine
         pen = pg.mkPen(colour, width=2 if curve.style == "predicted" else 1, style=style)
-        # a single value has no line
+        # a single point forms no line: draw a cross instead
         alone = np.count_nonzero(np.isfinite(curve.x) & np.isfinite(curve.y)) == 1
         mark = {"symbol": "x", "symbolSize": 10, "symbolPen": colour, "symbolBrush": colour} if alone else {}
         self._item.plot(curve.x, curve.y, pen=pen, connect="finite", **mark)

@@ -24,8 +24,8 @@ INTERVAL = 0.5
 
 
 class LiveViewArea(QWidget):
-    """Draws the view that the protocol's function returns, in `draw` and only after a change; a hidden page does not
-    call `draw`.
+    """The view that the protocol's function returns. `draw` redraws it after a change; it is not called while the page
+    is hidden.
     """
 
     def __init__(self, theme: Theme) -> None:
@@ -37,7 +37,7 @@ class LiveViewArea(QWidget):
         self._changed, self._shown_at = False, -inf
         self.gains, self.checks = GainPlot(theme), CheckTable(theme)
         self.plots: list[LivePlot] = []
-        """Plots of the panels, of which the first ones are in use."""
+        """Plots for the panels; those that the present view does not need are hidden."""
         self.parts = QSplitter(Qt.Orientation.Horizontal)
         self.parts.setChildrenCollapsible(False)
         for part in (self.gains, self.checks):

@@ -13,7 +13,7 @@ from bench.app.gui.controller import Controller
 from bench.app.run_display import Notice
 
 LOG_LINES = 2000
-"""Number of stored lines."""
+"""Largest number of stored lines; older ones are discarded."""
 
 
 class LogPanel(QWidget):

@@ -49,7 +49,7 @@ class MetersView(QWidget):
             self.update()
 
     def show_live(self, *, live: bool) -> None:
-        """Draw in colour if values arrive, otherwise in grey."""
+        """Draw the meters in colour while their values are live, otherwise in grey."""
         if live != self._live:
             self._live = live
             self.update()
@@ -68,7 +68,7 @@ class MetersView(QWidget):
                 meter.add(time, magnitudes[meter.key])
 
     def event(self, event: object) -> bool:
-        """Show the numbers of the meter at the pointer."""
+        """Show the numbers of the meter under the pointer as a tooltip."""
         if isinstance(event, QHelpEvent) and self.meters:
             place = min(int(event.pos().y() / self._row), len(self.meters) - 1)
             QToolTip.showText(event.globalPos(), self.meters[place].explanation, self)

@@ -20,21 +20,23 @@ from bench.live_values import TWIN_TRACE, TwinEstimate
 Kind = Literal["spectrum", "phase", "Poincaré"]
 KINDS: tuple[Kind, ...] = ("spectrum", "phase", "Poincaré")
 SECONDS: dict[Kind, float] = {"spectrum": 20.0, "phase": 3.0, "Poincaré": 60.0}
-"""Displayed length of the motion [s]."""
+"""Length of the displayed motion, by kind of plot [s]."""
 HIGHEST = 10.0
 """Highest displayed frequency [Hz]."""
 MODELLED = 3.0
-"""Displayed length of the live model's motion [s]."""
+"""Length of the displayed motion of the live model [s]."""
 SMOOTH = np.full(5, 0.2)
-"""Weights of the bins for the velocity, which average over several bins: the noise of the lasers is larger than the
-motion within a bin.
+"""Weights of the moving average of the drift over bins, from which the velocity is computed: within one bin, the noise
+of the lasers exceeds the motion.
 """
 _DRIFT = TRACES.index("drift")
 _T, _U1, _U2 = (TWIN_TRACE.index(name) for name in ("seconds", "u1", "u2"))
 
 
 def stroboscopic(time: NDArray[np.float64], values: NDArray[np.float64], omega: float) -> NDArray[np.float64]:
-    """`values`, shape (n, m), interpolated at multiples of the period of `omega` [rad/s], shape (k, m)."""
+    """`values`, shape (n, m), at the times `time` [s], shape (n,), interpolated at the multiples of the period of
+    `omega` [rad/s] in this interval; shape (k, m).
+    """
     period = 2.0 * pi / omega
     at = period * np.arange(np.ceil(time[0] / period), np.floor(time[-1] / period) + 1.0)
     return np.column_stack([np.interp(at, time, column) for column in values.T])

@@ -36,7 +36,7 @@ class RunFile:
     """Unit of every channel by name, the drive last."""
     runs: Mapping[int, float]
     labels: Mapping[str, str] = field(default_factory=dict[str, str])
-    """Printed names of fields of a point, as declared by the protocol."""
+    """Displayed names of fields of a point, as declared by the protocol."""
 
     @property
     def has_gains(self) -> bool:
@@ -70,7 +70,7 @@ def read_file(path: Path) -> RunFile:
 
 
 def _labels(protocol: str) -> Mapping[str, str]:
-    """Printed names of the results of a protocol; empty for a protocol that is not installed."""
+    """Displayed names of the results of a protocol; empty for a protocol that is not installed."""
     try:
         return load_protocol(protocol).view.labels
     except RockbenchError:
@@ -86,7 +86,7 @@ class Place(Enum):
 
 
 class FileList(QListWidget):
-    """The open files, in the order of opening."""
+    """List of the open files, in the order in which they were opened, except that `make_first` moves one to the top."""
 
     chosen_changed = Signal()
     ticked_changed = Signal()
@@ -110,7 +110,7 @@ class FileList(QListWidget):
         return [file for row, file in enumerate(self._files) if self.item(row).checkState() == checked]
 
     def put(self, file: RunFile, place: Place = Place.TOO) -> None:
-        """Add `file`, or replace an earlier reading of the same file."""
+        """Add `file`, or replace the description of the same file that was read earlier."""
         place_of = self._place(file.path)
         row = len(self._files) if place_of is None else place_of
         self.blockSignals(True)
@@ -127,7 +127,7 @@ class FileList(QListWidget):
             self._tick(row, alone=place is Place.ALONE)
             self.setCurrentRow(row)
         self.blockSignals(False)
-        # a file that is only listed causes no redrawing
+        # a file that is neither selected nor ticked causes no redrawing
         if row == self.currentRow():
             self.chosen_changed.emit()
         if self.item(row).checkState() == Qt.CheckState.Checked:

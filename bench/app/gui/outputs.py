@@ -1,4 +1,4 @@
-"""Reports on a data file and exports of it, made by the commands of the command line; existing files are never
+"""Reports and exports of a data file, created by `rockbench report` and `rockbench export`; existing files are never
 overwritten.
 """
 
@@ -29,7 +29,7 @@ def free(path: Path) -> Path:
 
 
 class Outputs(QWidget):
-    """Row that makes a report or an export of a file: choice of format and button for each, and the result."""
+    """Row of controls that create a report or an export of a file: format and button for each, and the result."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -62,7 +62,7 @@ class Outputs(QWidget):
         self._refresh()
 
     def use(self, file: Path | None) -> None:
-        """Use this file as the source."""
+        """Set the data file to be reported on or exported."""
         self._file = file
         self._refresh()
 
