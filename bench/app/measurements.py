@@ -70,7 +70,7 @@ class Quantity(NDArrayOperatorsMixin):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Samples(Quantity):
-    """Samples of the signal `name`, shape (n,), and their times, which increase and jump between runs."""
+    """Samples of the signal `name`, shape (n,), and their bench times [s], which increase, with gaps between runs."""
 
     time: Quantity
     name: str
@@ -78,8 +78,8 @@ class Samples(Quantity):
 
 @dataclass(frozen=True)
 class Run:
-    """The samples from the arming of the rig at bench time `start` to its stop at `stop` [s]. `beta` is the label of
-    the mounted spring, None for the bare frame.
+    """A run: the samples from the arming of the rig at bench time `start` [s] to its stop at `stop` [s]. `beta` is the
+    label (k_C/k1) of the mounted spring, None for the bare frame.
     """
 
     number: int

@@ -156,7 +156,7 @@ def predict(
     **options: Any,
 ) -> SteadyPrediction | SeismicPrediction | Modes:
     """Predict steady motions at `omega` [rad/s], the gain under a `record`, or, without either, the modes. Raises
-    InvalidInput.
+    InvalidInput for invalid arguments.
 
     specimen : a Specimen, a TOML file, or a specimen file (.json); by default the specimen of the `configuration` or of
         the paper.
@@ -293,7 +293,7 @@ def configured(given: BenchConfiguration | File | None) -> BenchConfiguration:
 def _known(
     given: Specimen | File | None, configuration: BenchConfiguration | File | None
 ) -> tuple[Specimen, SpecimenKnowledge, BenchConfiguration]:
-    """The specimen for a prediction, its uncertainty, and the bench."""
+    """The specimen for a prediction, its uncertainty, and the configuration of the bench."""
     bench = configured(configuration)
     if given is None:
         return bench.known_specimen, bench.known, bench

@@ -118,13 +118,13 @@ def _rounded(value: Any) -> Any:
 
 @dataclass(frozen=True)
 class Preflight:
-    """Result of the check.
+    """Result of the check of a run before its start.
 
     margins : margin to each limit, in ascending order.
     room : disk space; None if the duration of the run is unknown.
     sensors : warnings about sensor calibrations.
     reviewed : cross-checks of configuration and parameters.
-    scales : notes that state each frequency in both units.
+    scales : notes that state each circular frequency in rad/s and in Hz.
     """
 
     forecast: Forecast
@@ -210,7 +210,7 @@ def _aged(configuration: BenchConfiguration) -> tuple[str, ...]:
 def _unpredicted(configuration: BenchConfiguration) -> tuple[str, ...]:
     """Warnings about the limits of further channels, for which no margin is predicted."""
     return tuple(
-        f"the limit on {channel.name} ends a run, but its demand is not predicted"
+        f"a run ends if the limit on {channel.name} is exceeded, but no margin to this limit is predicted"
         for channel in configuration.channels
         if channel.limit is not None
     )

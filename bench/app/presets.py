@@ -36,7 +36,8 @@ class Presets:
         """File of a preset. Raises InvalidInput for a name that is not a valid file name."""
         if not _NAME.fullmatch(name) or len(name) > _LONGEST:
             allowed = (
-                f"letters, digits, spaces and ().,=+- are allowed, up to {_LONGEST}, beginning with a letter or digit"
+                f"use up to {_LONGEST} letters, digits, spaces and ().,=+-_, begin with a letter or digit, and do not "
+                "end with a space or one of (.,=-"
             )
             raise InvalidInput("preset", name, allowed)
         return self._folder / protocol / f"{name}.toml"
@@ -93,7 +94,7 @@ def _put(path: Path, text: str) -> None:
 
 
 def _toml(value: str | bool | list[str], *, many: bool) -> str:
-    """A typed value in TOML: a number as typed, any other value as a string, which a protocol file may contain too."""
+    """A typed value in TOML: a number as typed, any other value as a string, which a protocol file also accepts."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, list):

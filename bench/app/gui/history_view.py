@@ -29,15 +29,15 @@ from bench.app.gui.sample_plot import Line, SamplePlot
 from bench.app.gui.widgets import ElidingLabel
 
 PARTS = 1200
-"""Least number of parts of the visible range, with two points each; below twice this number of samples, each sample is
-drawn.
+"""Smallest number of parts of the visible range, each drawn as its minimum and maximum. With fewer than twice as many
+samples, each sample is drawn.
 """
 SETTLE = 150
-"""Delay between a zoom, or a move of a cursor, and the reading of the file [ms]."""
+"""Delay from a zoom or a cursor movement to the reading of the file [ms]."""
 MOST = 12
-"""Largest number of lines."""
+"""Largest number of drawn lines."""
 LEAST = 1e-12
-"""Smallest amplitude that is drawn, because the axis is logarithmic."""
+"""Lower bound of the drawn amplitudes, because the axis is logarithmic."""
 
 
 class HistoryView(QWidget):
@@ -74,7 +74,9 @@ class HistoryView(QWidget):
 
     @property
     def tracks(self) -> list[Track]:
-        """The channels that are shown: those of the file, then those of the other ticked files that have them."""
+        """The channels to be drawn: those of the selected file, then the same ones of the other ticked files; at most
+        `MOST`.
+        """
         file, row = self._file, self.run.currentIndex()
         if file is None or row < 0 or self.channel.currentIndex() < 0:
             return []
@@ -96,7 +98,7 @@ class HistoryView(QWidget):
         self.spectrum.use_theme(theme)
 
     def use(self, file: RunFile | None) -> None:
-        """Show the samples of this file, of the same channels as before where it has them."""
+        """Show the samples of this file, with the same channels as before, as far as the file contains them."""
         self._file = file
         kept, checked = self.channel.currentData(), {each.data() for each in self._menu.actions() if each.isChecked()}
         for choice in (self.run, self.channel):
@@ -122,7 +124,7 @@ class HistoryView(QWidget):
         self.show_whole()
 
     def compare(self, files: Sequence[RunFile]) -> None:
-        """Offer the same channels of these files, which are ticked."""
+        """Allow the same channels of `files`, the ticked ones, to be drawn as well."""
         self._others = files
         self.overlay.setEnabled(len(files) > 1)
         if self.overlay.isChecked():
@@ -222,7 +224,7 @@ class HistoryView(QWidget):
         ):
             part.setToolTip(tip)
         self.overlay.setEnabled(False)
-        # the row fits a screen of 1024 px
+        # narrow buttons, so that the row fits a screen 1024 px wide
         for button in (self.further, self.whole):
             button.setProperty("tight", "yes")
         row = QHBoxLayout()

@@ -20,8 +20,8 @@ UNREAD = 700
 
 _AT_ZERO = "The output is at zero and the rig is stopped until you answer."
 _ARMING = (
-    "Before arming, every safety input must be good. Then, at rest, every sensor must measure and the storeys must be "
-    "still. The table moves only after these checks."
+    "Before arming, every safety input must be good. Then, at rest, every sensor must give valid readings and the "
+    "storeys must be still. The table moves only after these checks."
 )
 _NOT_CHECKED = "No sensor detects whether this task is done, so make sure before you answer. {what}"
 UNKNOWN_TASK = (
@@ -47,7 +47,7 @@ TASKS = {
     ),
     OperatorTask.LOCK_TABLE: (
         f"The manual release must not move the table. {_AT_ZERO} A clamped table is not driven.",
-        _NOT_CHECKED.format(what="Tests with the clamped table are recorded without drive."),
+        _NOT_CHECKED.format(what="Tests with a clamped table are recorded without a drive signal."),
     ),
     OperatorTask.UNLOCK_TABLE: (
         f"The table must be free before it is driven again. {_AT_ZERO}",
@@ -55,8 +55,8 @@ TASKS = {
     ),
     OperatorTask.WATCH_BLOCK: (
         f"Laser 2 measures the rocking of the block. {_AT_ZERO}",
-        "Before arming, every safety input must be good. Then, at rest, the laser must measure. The guard does not "
-        "monitor the drift while the laser points at the block. The table is not driven.",
+        "Before arming, every safety input must be good. Then, at rest, the laser must give valid readings. The guard "
+        "does not monitor the drift while the laser points at the block. The table is not driven.",
     ),
     OperatorTask.WATCH_STOREYS: (
         f"Laser 2 must point at storey 2 again, since the guard monitors the drift with it. {_AT_ZERO}",
@@ -79,7 +79,7 @@ TASKS = {
 
 
 class Prompt(QFrame):
-    """An operator task, its reason, and the checks that follow; hidden while no question is open."""
+    """Panel with an operator task, its reason, and the checks that follow; hidden while no question is open."""
 
     def __init__(self, controller: Controller) -> None:
         super().__init__()

@@ -21,7 +21,7 @@ RAYS = ((-1.0, 0.15), (-0.7, 0.7), (0.7, 0.7), (1.0, 0.15))
 
 
 class Drawing:
-    """Paints shapes in `area` [px]; the ground is its lower edge."""
+    """Paints shapes in `area` [px], whose lower edge is the level of the table."""
 
     def __init__(self, painter: QPainter, theme: Theme, outline: Outline, area: QRectF) -> None:
         self._painter, self._theme = painter, theme
@@ -119,8 +119,10 @@ class PhysicalPicture(QWidget):
         self.canvas.update()
 
     def move_to(self, motion: NDArray[np.float64], block: tuple[float, float] | None) -> None:
-        """Show one instant: `motion` has the signals `bench.app.ipc.messages.TRACES`, and `block` the angle of the
-        block [rad] and the time since its last impact [s]; it is None if unknown.
+        """Show one instant.
+
+        motion : signals `bench.app.ipc.messages.TRACES` in SI units, shape (n_signals,).
+        block : angle of the block [rad] and time since its last impact [s]; None if unknown.
         """
         self._motion, self._block = motion, block
         self._draw()

@@ -38,7 +38,7 @@ class PlanView(QWidget):
         self.table.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
         self.table.horizontalHeader().setStretchLastSection(True)
         self.table.setAccessibleName(texts.NAMES["margins"])
-        # always shown in full: only the table scrolls
+        # the details are always shown in full: only the table scrolls
         self.details.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Minimum)
         self.table.setMinimumHeight(120)
         layout = QVBoxLayout(self)

@@ -63,7 +63,7 @@ class PresetBar(QWidget):
         self.defaults.setToolTip(texts.DEFAULTS_TIP)
 
     def use(self, protocol: Protocol[Any], form: Form) -> None:
-        """Use the shown form of a protocol."""
+        """Connect this row to `form`, the displayed form of a protocol."""
         if self._form is not None:
             # the form may have been replaced and deleted
             with suppress(RuntimeError):
@@ -81,11 +81,11 @@ class PresetBar(QWidget):
         try:
             return None if self._presets is None else self._presets.last(protocol.name)
         except RockbenchError:
-            # the reason is shown when the button is pressed
+            # a press of the button for the last values shows the error
             return None
 
     def keep_last(self) -> None:
-        """Store the values of the form, whose plan was checked."""
+        """Store the values of the form as those of the last checked plan."""
         presets, protocol, form = self._presets, self._protocol, self._form
         if presets is None or protocol is None or form is None:
             return
@@ -96,7 +96,9 @@ class PresetBar(QWidget):
         self._refresh()
 
     def report(self, done: str) -> None:
-        """Show `done`, the origin of the values in the form, and those that the protocol does not have or rejects."""
+        """Show `done`, which states the origin of the values in the form, the values for which the protocol has no
+        parameter, and whether any value is invalid.
+        """
         form, words = self._form, [done]
         if form is not None and form.unknown:
             shown = ", ".join(f"{name} = {as_typed(value)}" for name, value in form.unknown.items())
@@ -159,7 +161,7 @@ class PresetBar(QWidget):
         self._refresh()
 
     def _listed(self, name: str) -> bool:
-        # file names that differ in case only are the same on some systems
+        # on some systems, names that differ only in case denote the same file
         return name.casefold() in [self.name.itemText(place).casefold() for place in range(self.name.count())]
 
     def _list(self, name: str) -> None:
@@ -171,7 +173,7 @@ class PresetBar(QWidget):
         self.name.setCurrentIndex(self.name.findText(name))
         self.name.setEditText(name)
         if (edit := self.name.lineEdit()) is not None:
-            # the beginning of a long name is visible
+            # so that the beginning of a long name is visible
             edit.setCursorPosition(0)
         self.name.blockSignals(False)
         self._refresh()

@@ -63,7 +63,7 @@ class ProtocolPage(QWidget):
         self._checking = self._began = self._unattended = False
         self._edited_test: Queued | None = None
         self._made: Path | None = None
-        # created first, so that the values follow the protocol in the tab order
+        # created before the choice of the protocol, which the Tab key leaves for the values
         self.presets = PresetBar(presets)
         self.choice = QComboBox()
         self.choice.addItems([entry.name for entry in entries])
@@ -123,7 +123,7 @@ class ProtocolPage(QWidget):
         return self._controller.held or self.why_not_planned
 
     def use(self, configuration: BenchConfiguration) -> None:
-        """Use another bench."""
+        """Use another configuration; the plan must then be checked again."""
         self._configuration = configuration
         self.options.use(configuration)
         self._edited()
@@ -174,7 +174,7 @@ class ProtocolPage(QWidget):
             self.leave_editing()
 
     def edit(self, test: Queued, number: int) -> None:
-        """Edit test `number` of the queue, which has not begun."""
+        """Show `test`, number `number` of the queue, in the form to be edited."""
         self._edited_test = test
         self.choice.setCurrentIndex([entry.name for entry in self._entries].index(test.protocol))
         self._show_form(Form(self.entry.parameters, test.parameters))
@@ -232,7 +232,7 @@ class ProtocolPage(QWidget):
         return super().eventFilter(watched, event)
 
     def _plan_check(self) -> PlanCheck:
-        """The plan in the form. Raises InvalidInput."""
+        """Plan check with the values of the form. Raises InvalidInput for an invalid value or an unusable folder."""
         entry, parameters = self.entry, self.form.parameters()
         out = self.options.out or Path(self.folder.placeholderText())
         check_folder(out, result_names(entry))
@@ -310,7 +310,7 @@ class ProtocolPage(QWidget):
             button.setMinimumHeight(48)
         give_key(self.ask_help, "F1")
         self.ask_help.setToolTip(texts.HELP_TIP)
-        # the field keeps the focus
+        # so that the field keeps the focus
         self.ask_help.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         # a key press meant for the form must not start a run
         self.start.setFocusPolicy(Qt.FocusPolicy.NoFocus)

@@ -17,7 +17,7 @@ from bench.config.model import BenchConfiguration
 
 @dataclass(frozen=True, eq=False)
 class Checked:
-    """A test whose plan was accepted, and the bench for which the `plan` was computed."""
+    """A test whose plan was accepted; `plan` is the request, with the configuration, and `found` the result."""
 
     test: Queued
     plan: PlanCheck
@@ -57,7 +57,7 @@ class QueueCheck(QObject):
         controller.plan_checked.connect(self._plan_checked)
 
     def known(self, test: Queued, configuration: BenchConfiguration) -> Checked | None:
-        """The checked plan of this test for this bench, or None."""
+        """The accepted plan of this test for this configuration; None if there is none."""
         return next(
             (each for each in self._checked if each.test is test and each.plan.configuration is configuration), None
         )

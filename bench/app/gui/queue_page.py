@@ -47,7 +47,7 @@ class QueuePage(QWidget):
     """List of tests; every action applies to the selected test and has a shortcut key."""
 
     edit_requested = Signal(object, int)
-    """Emits a `Queued` that is to be edited and has not begun, and its number."""
+    """Emits a `Queued` to be edited, which has not begun, and its number from 1."""
 
     def __init__(self, controller: Controller, runner: QueueRunner, entries: Sequence[Protocol[Any]]) -> None:
         super().__init__()
@@ -78,7 +78,7 @@ class QueuePage(QWidget):
 
     @property
     def selected(self) -> int | None:
-        """Index of the selected test."""
+        """Index of the selected test; None without a selection."""
         row = self.table.currentRow()
         return row if 0 <= row < len(self._runner.queue.tests) else None
 
@@ -234,7 +234,7 @@ class QueuePage(QWidget):
 
 
 def _plain(default: object) -> object:
-    """A default value, formatted as in a file."""
+    """A default value as plain data, as it is read from a file."""
     return [*cast(tuple[object, ...], default)] if isinstance(default, tuple) else getattr(default, "value", default)
 
 

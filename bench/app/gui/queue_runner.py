@@ -84,7 +84,9 @@ class QueueRunner(QObject):
             self._owner.release()
 
     def do(self, change: Callable[[], object]) -> bool:
-        """Change the queue; a refusal or a failure to save it is reported and pauses the queue."""
+        """Apply `change` to the queue, and return whether it succeeded. A refusal, or a failure to save the queue, is
+        reported and pauses the queue.
+        """
         try:
             change()
         except RockbenchError as error:
@@ -96,7 +98,9 @@ class QueueRunner(QObject):
         return True
 
     def replace(self, old: Queued, new: Queued) -> bool:
-        """Replace the test `old` in place; reports a refusal if `old` has begun, or was changed, skipped or removed."""
+        """Replace the test `old` in place, and return whether this succeeded. A refusal is reported if `old` has begun,
+        or was changed, skipped or removed.
+        """
         index = self._place(old)
         if index is None:
             self.troubled.emit(Trouble(texts.QUEUE_GONE, texts.QUEUE_GONE_DID, texts.QUEUE_GONE_NOW))

@@ -16,8 +16,8 @@ _KEY = "recent configurations"
 
 
 class RecentFiles(QComboBox):
-    """Files, last used first, kept in `settings`; hidden while there are none. A missing file stays listed: its disk
-    may be mounted again.
+    """List of files, the most recently used one first, stored in `settings`; hidden while it is empty. A missing file
+    stays listed: its disk may be mounted again.
     """
 
     chosen = Signal(Path)
@@ -26,7 +26,7 @@ class RecentFiles(QComboBox):
         super().__init__()
         self._settings = settings
         kept = None if settings is None else settings.value(_KEY)
-        # QSettings returns a list of one string as the string
+        # QSettings returns a list of one string as a plain string
         texts_kept = [kept] if isinstance(kept, str) else cast(list[object], kept) if isinstance(kept, list) else []
         self.paths = [Path(text) for text in texts_kept if isinstance(text, str)]
         self.setPlaceholderText(texts.RECENT)
@@ -46,7 +46,7 @@ class RecentFiles(QComboBox):
         self._list()
 
     def hold(self, why: str) -> None:
-        """Disable the list for a reason; an empty one enables it."""
+        """Disable the list, with the reason `why` as its tooltip; an empty `why` enables it."""
         self.setEnabled(not why)
         self.setToolTip(why or texts.RECENT_TIP)
 

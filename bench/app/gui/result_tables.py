@@ -1,4 +1,4 @@
-"""Tables of the Results page: points, all fields, and differences of two runs."""
+"""Tables of the Results page: points, all fields, and differences between runs."""
 
 from collections.abc import Mapping, Sequence
 
@@ -30,7 +30,7 @@ def show_points(
     everything: bool,
 ) -> None:
     """Show the quantities of every point with prediction and verdict; with `everything`, every field of the file.
-    `labels` are the printed names of fields.
+    `labels` are the displayed names of fields.
     """
     if everything:
         headings, rows = every_field(results, points)

@@ -1,5 +1,5 @@
-"""The Results page: the runs of a folder, and points, gains and samples of the opened ones, with comparison, report and
-export.
+"""The Results page: the runs of a folder, and the points, gains and samples of the opened runs, with comparison, report
+and export.
 """
 
 from collections.abc import Mapping
@@ -43,7 +43,7 @@ from sim.errors import RockbenchError
 
 
 class ResultsPage(QWidget):
-    """Two views: the list of all runs, and the results of the opened ones, of which the ticked are drawn together."""
+    """Two views: the list of all runs, and the results of the opened runs, which are drawn together for ticked runs."""
 
     def __init__(self, controller: Controller, theme: Theme) -> None:
         super().__init__()
@@ -59,7 +59,7 @@ class ResultsPage(QWidget):
         self.browser.opened.connect(self._open_run)
         self.browser.ticked.connect(self._tick_run)
         self.browser.referred.connect(self._compare_against)
-        # one line: the table below names every point
+        # one line is enough, because the table below lists every point
         self.verdict = ElidingLabel()
         self.verdict.setProperty("role", "verdict")
         self.verdict.setAccessibleName(texts.NAMES["alpha"])
@@ -102,7 +102,7 @@ class ResultsPage(QWidget):
         self._draw()
 
     def reuse_through(self, setup: SetupPage) -> None:
-        """Let the Setup page use results of runs."""
+        """Connect this page to the Setup page, which uses selected results for the following runs."""
         self.reuse.wanted.connect(setup.use_result)
         self.reuse.returned.connect(setup.use_given)
         setup.used.connect(self.reuse.show_used)
@@ -156,7 +156,7 @@ class ResultsPage(QWidget):
             self._show_files([Path(url.toLocalFile())])
 
     def _open_run(self, path: Path) -> None:
-        """Open a run of the list: alone, unless two or more are compared."""
+        """Open a run from the list, and untick the others unless two or more are compared."""
         if not self._held(path) and self.show_file(
             path, place=Place.TOO if len(self.files.ticked) > 1 else Place.ALONE
         ):
@@ -172,8 +172,8 @@ class ResultsPage(QWidget):
             self.files.tick(path, on=True)
 
     def _held(self, path: Path) -> bool:
-        """Whether the file must stay closed until the end of a run: a window that waits for a slow disk answers neither
-        the session nor STOP.
+        """Whether the file must not be opened before the end of the run, because a window that waits for a slow disk
+        responds neither to the session nor to STOP.
         """
         held = self._controller.running and not self.files.holds(path)
         if held:

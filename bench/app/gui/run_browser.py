@@ -1,4 +1,4 @@
-"""List of the runs of a folder, in which runs are searched, opened and selected for a comparison."""
+"""List of the runs of a folder, in which the user searches, opens and compares runs."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -35,7 +35,7 @@ AGAIN, SETTLE = 5_000, 300
 folder [ms].
 """
 WIDTHS = (92, 116, 88, 0, 120, 84, 150, 84)
-"""Initial widths of the columns [px]; the result has the rest."""
+"""Initial widths of the columns [px]; the column of the result, with 0, takes the remaining width."""
 RESULT = texts.RUN_TITLES.index("result")
 
 

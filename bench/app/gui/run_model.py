@@ -1,4 +1,4 @@
-"""Table model of the runs of a folder: search, order, marks of the comparison, and pictures loaded on demand."""
+"""Table model of the runs of a folder: search, sorting, marks of compared runs, and pictures loaded on demand."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -16,12 +16,12 @@ from bench.app.gui.background import Reader
 PICTURE = QSize(64, 40)
 """Size of a picture in the list [px]."""
 AT_ONCE = 8
-"""Number of pictures that one call in the thread loads."""
+"""Number of pictures that the thread loads in one call."""
 CHOICE, STATUS, DATE = 0, texts.RUN_TITLES.index("status"), texts.RUN_TITLES.index("date")
 Index = QModelIndex | QPersistentModelIndex
 Picture = tuple[Path, tuple[int, ...]]
 NOWHERE = QModelIndex()
-"""Index of the root of a table."""
+"""Invalid index, which denotes the root of a table model."""
 
 
 def load_pictures(wanted: Sequence[Picture], size: QSize) -> dict[Picture, QImage]:
@@ -35,7 +35,7 @@ def _fitted(path: Path, size: QSize) -> QImage:
     if not whole.isValid():
         return QImage()
     scaled = whole.scaled(size, Qt.AspectRatioMode.KeepAspectRatio)
-    # twice the size first: the decoder scales without a filter
+    # decode at twice the size and smooth afterwards, because the decoder scales without a filter
     reader.setScaledSize(scaled * 2)
     found = reader.read()
     if found.isNull():
@@ -50,7 +50,7 @@ def _fitted(path: Path, size: QSize) -> QImage:
 
 
 class RunModel(QAbstractTableModel):
-    """The files that the search selects, in the selected order. A file without a row has not been read yet."""
+    """The files that match the search, in the selected order. A file without a `RunRow` has not been read yet."""
 
     ticked = Signal(object, bool)
     """Emits the path of a run, and whether it was ticked or unticked."""
@@ -73,7 +73,7 @@ class RunModel(QAbstractTableModel):
 
     @property
     def all(self) -> int:
-        """Number of files, listed or not."""
+        """Number of all files, including those that do not match the search."""
         return len(self._found)
 
     def row(self, path: Path) -> RunRow | None:
@@ -102,7 +102,7 @@ class RunModel(QAbstractTableModel):
         self._repaint()
 
     def search(self, text: str) -> None:
-        """List the files with all words of `text`."""
+        """List only the files whose texts contain all words of `text`."""
         self._words = tuple(text.lower().split())
         self.arrange()
 
@@ -112,7 +112,7 @@ class RunModel(QAbstractTableModel):
         self.arrange()
 
     def compare(self, compared: Sequence[Path]) -> None:
-        """Mark the runs of the comparison, the reference first; paths are those of the listed files."""
+        """Mark the compared runs, of which the first is the reference, by their paths in the list."""
         self._compared, self._reference = frozenset(compared), compared[0] if compared else None
         self._repaint()
 

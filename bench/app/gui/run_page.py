@@ -1,4 +1,4 @@
-"""The Run page: meters of the limits, verdict, the protocol's plot, picture, traces, points and log."""
+"""The Run page: limit meters, verdict, the protocol's plot, picture of the specimen, traces, points and log."""
 
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QResizeEvent
@@ -85,7 +85,7 @@ class RunPage(QWidget):
         self.live.predict(prediction)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        """Choose the size of the verdict."""
+        """Limit the height of the verdict to a share of that of the page."""
         super().resizeEvent(event)
         self.verdict.allow(max(self.height(), LOWEST))
 
@@ -170,7 +170,7 @@ class RunPage(QWidget):
         self.meters.add(traces)
         for block in traces:
             self.block.place(block)
-        # immediately, not at the next tick
+        # draw new samples at once, without waiting for the timer
         self._draw_motion()
 
     def _draw(self) -> None:

@@ -47,9 +47,9 @@ class SamplePlot(pg.GraphicsLayoutWidget):
         self._theme, self._below, self._left, self._log = theme, below, left, log
         self.lines: Sequence[Line] = ()
         self.plots = list[Any]()
-        """Plot items from top to bottom; there is always one."""
+        """Plot items from top to bottom; at least one."""
         self.curves = list[Any]()
-        """The drawn lines, in the order of `lines`."""
+        """Curve items of the drawn lines, in the order of `lines`."""
         self._pairs = list[tuple[Any, Any]]()
         self._cursors: tuple[float, float] | None = None
         self._moving = False
@@ -86,7 +86,7 @@ class SamplePlot(pg.GraphicsLayoutWidget):
         for plot, unit in zip(self.plots, units, strict=True):
             plot.clearPlots()
             own = [line for line in lines if line.unit == unit]
-            # stacked plots have no space for a name, which is in the legend
+            # stacked plots have no space for a name on the axis; the legend states it
             name = lines[0].name if len(lines) == 1 else self._left if len(units) == 1 else ""
             plot.setLabel("left", " ".join(part for part in (name, f"[{unit}]" if unit else "") if part))
             plot.legend.clear()

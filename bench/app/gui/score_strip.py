@@ -15,9 +15,9 @@ from bench.app.display.theme import Theme
 from bench.app.gui.widgets import colour_axes
 
 LEAST = 1.5
-"""Smallest displayed range, on either side of zero."""
+"""Smallest displayed range of E_n on either side of zero."""
 HEIGHT = 104
-"""Height [px]."""
+"""Height of the strip [px]."""
 LABELS = 12
 """Largest number of ticks on the horizontal axis."""
 
@@ -29,7 +29,7 @@ class ScoreStrip(pg.PlotWidget):
         super().__init__(enableMenu=False)
         self._theme = theme
         self.scores: list[tuple[int, float, str]] = []
-        """Row from 1, E_n, and description of each compared result."""
+        """Number of the row, from 1, E_n and description of each compared result."""
         self.setAccessibleName(texts.SCORES)
         self.setToolTip(texts.SCORES_TIP)
         self.setFixedHeight(HEIGHT)

@@ -30,7 +30,7 @@ from sim.errors import RockbenchError
 
 
 class DevicesPanel(QWidget):
-    """Search for devices, only on request and never while a run or the queue uses the devices."""
+    """Panel that searches for devices, only on request and never during a run or while the queue runs."""
 
     def __init__(self, controller: Controller) -> None:
         super().__init__()
@@ -55,7 +55,7 @@ class DevicesPanel(QWidget):
         self._refresh()
 
     def use(self, configuration: BenchConfiguration, path: Path | None) -> None:
-        """Use the server and the ports of this configuration, which was read from `path`."""
+        """Use this configuration, read from `path`, for the next search, and clear the displayed result."""
         self._path = path
         simulated = configuration.backend == "simulated"
         self._say(texts.FIND_SIMULATED if simulated else texts.FIND_EMPTY, "calm")
@@ -165,7 +165,7 @@ class SetupPage(QWidget):
         self._use(configuration, self.path)
 
     def use_given(self) -> None:
-        """Use the configuration as opened, without results selected since."""
+        """Use the configuration as it was opened, without the results selected since then."""
         self._used = {}
         self._use(self._given, self.path)
 

@@ -8,7 +8,7 @@ from bench.app.ipc.messages import Ended, Question, Refused
 from bench.events import Event, State, StateChanged
 
 QUESTION, END, ABORT = 1, 2, 5
-"""Numbers of beeps."""
+"""Numbers of beeps for a question, for the end of a run, and for an abort or a failure."""
 
 INTERVAL = 220
 """Time between two beeps [ms], long enough for the bell of a desktop to sound separately."""
@@ -33,7 +33,7 @@ class Sounds(QObject):
         controller.ended.connect(self._ended)
 
     def sound(self, beeps: int) -> None:
-        """Begin a sequence of beeps; a sequence in progress is only replaced by one that is longer than its rest."""
+        """Begin a sequence of beeps. It replaces a sequence in progress only if fewer beeps of that one are left."""
         if self.muted or beeps <= self._left:
             return
         self._left = beeps

@@ -169,6 +169,6 @@ def _show(label: QLabel, called: str, found: Steadiness, judged: SensorSteadines
 
 
 def _change(found: Steadiness) -> str:
-    """Text of the difference of the means of the two windows in excess of the noise."""
+    """Text of the relative difference between the means of the two windows, in excess of the noise, in per cent."""
     change = 100.0 * found.drift
     return texts.CHANGE.format(change=change) if change >= 0.01 else texts.NO_CHANGE

@@ -79,8 +79,8 @@ class TracePlot(QWidget):
         return labels_of(self._further, self._face)
 
     def watch_block(self, face: float | None, since: float = 0.0) -> None:
-        """Label the traces for laser 2 on the block's face at this height [m], None for storey 2, from bench time
-        `since` [s]; earlier samples, of another target, are discarded.
+        """Label the traces for laser 2 aimed at the block's face at height `face` [m], or at storey 2 if None. Samples
+        from before bench time `since` [s], which show the former target, are discarded.
         """
         if face != self._face:
             self._face, self._fresh = face, True

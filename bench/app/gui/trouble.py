@@ -1,4 +1,4 @@
-"""The panel of the fault reports, and the reports on errors of the window itself."""
+"""Panel that shows fault reports, and reporting of uncaught errors in the window's own code."""
 
 import sys
 import threading

@@ -1,4 +1,4 @@
-"""Row for the use of a result of the selected run in the following runs."""
+"""Row of controls with which the following runs use a result of the selected run."""
 
 from collections.abc import Mapping
 from pathlib import Path

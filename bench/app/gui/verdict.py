@@ -40,7 +40,7 @@ class VerdictLabel(QLabel):
             self._fit()
 
     def allow(self, page: int) -> None:
-        """Limit the height to a share of the height of the `page` [px]."""
+        """Limit the height to the share `SPACE` of the height `page` of the page [px]."""
         self._space = round(SPACE * page)
         self._fit()
 
@@ -51,7 +51,7 @@ class VerdictLabel(QLabel):
             self._fit()
 
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: ARG002 - the signature is Qt's
-        """Draw the sentence; a style sheet could not narrow the font."""
+        """Draw the sentence with narrow letters, which a style sheet cannot set."""
         painter = QPainter(self)
         painter.setFont(_font(self.font(), self._size))
         painter.setPen(self.palette().color(self.foregroundRole()))
@@ -63,7 +63,7 @@ class VerdictLabel(QLabel):
 
     @property
     def pixels(self) -> int:
-        """Largest size of the font with which the text fits [px]."""
+        """Largest font size with which the text fits [px]; `SMALLEST` if it fits with none."""
         sizes: Sequence[int] = range(LARGEST, SMALLEST, -2)
         return next((size for size in sizes if self._fits(self._box(size))), SMALLEST)
 
@@ -82,7 +82,7 @@ class VerdictLabel(QLabel):
 
 
 def _unbroken(part: str) -> str:
-    """A short part of the sentence, with its spaces replaced so that no line break occurs."""
+    """The part with no-break characters, so that it stays on one line; unchanged if longer than `UNBROKEN`."""
     joined = part.replace(" ", "\N{NO-BREAK SPACE}").replace("/", "/\N{WORD JOINER}")
     return joined if len(part) <= UNBROKEN else part
 

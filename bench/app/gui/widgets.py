@@ -37,7 +37,7 @@ SIDE = 56
 
 
 class Lamp(QWidget):
-    """A status lamp; each state has its own shape and colour."""
+    """A status lamp, whose shape and colour represent the state."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -95,8 +95,8 @@ def set_level(label: QLabel, level: str) -> None:
 
 
 class ElidingLabel(QLabel):
-    """A one-line label. It shortens a text that does not fit with an ellipsis, shows the full text in a tooltip, and
-    never widens a page.
+    """A one-line label that never widens a page. A text that is too long ends in an ellipsis; the tooltip then shows
+    the full text.
     """
 
     def __init__(self, text: str = "") -> None:
@@ -146,15 +146,15 @@ def scrolling(content: QWidget, width: int, height: int) -> QScrollArea:
     area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
     holder = _Holder(content, width, height)
     area.setWidget(holder)
-    # the background of the page is that of its tab
+    # transparent, so that the page has the background of its tab
     for part in (holder, area.viewport()):
         part.setAutoFillBackground(False)
     return area
 
 
 class _Holder(QWidget):
-    """Keeps `content` at its natural size. It has no layout: with a layout, the scroll area would give wrapped text its
-    preferred height and would scroll even if the contents fit.
+    """Fills itself with `content`, at least `width` x `height` [px]. It has no layout: with a layout, the scroll area
+    would give wrapped text its preferred height and would scroll even if the contents fit.
     """
 
     def __init__(self, content: QWidget, width: int, height: int) -> None:

@@ -1,4 +1,4 @@
-"""The operator's window, with the header with STOP, the panels below it and the pages; and Qt's main loop."""
+"""The operator's window, which consists of the header with STOP, panels and pages; and Qt's main loop."""
 
 import signal
 import sys
@@ -92,9 +92,9 @@ _SOUNDS = "sounds"
 
 
 class Window(QMainWindow):
-    """The operator's window. Every part is a client of `controller`. `settings` stores layout and recent files, `queue`
-    is the file of the queue, `presets` the folder of presets; what is None is not stored. With `tour`, the guided tour
-    is shown.
+    """The operator's window, whose parts communicate with the session through `controller`. `settings` stores the
+    layout and the recent files, `queue` is the file of the queue, and `presets` the folder of the presets; if one of
+    these is None, its contents are not stored. With `tour`, the guided tour is shown.
     """
 
     def __init__(
@@ -170,7 +170,7 @@ class Window(QMainWindow):
         super().resizeEvent(event)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        """Hide the tour while a question or a fault report is open."""
+        """Hide the tour while a question to the operator, a fault report or the question before closing is shown."""
         if event.type() in (QEvent.Type.ShowToParent, QEvent.Type.HideToParent):
             self.welcome.give_way(watched.objectName(), to=event.type() == QEvent.Type.ShowToParent)
         return super().eventFilter(watched, event)

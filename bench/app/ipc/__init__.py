@@ -1,1 +1,3 @@
-"""Session process and its clients: when a window closes, freezes or crashes, a run continues or ramps out."""
+"""The session process, which carries out a run, and its clients. If the window closes, freezes or crashes, the run
+ramps out, or continues if it was set to do so.
+"""

@@ -94,7 +94,7 @@ def announced(server: SessionServer, run: Run, owner: str) -> Generator[None]:
 
 
 class _Limited:
-    """A connection that raises TimeoutError unless each message arrives within `PATIENCE`."""
+    """A connection that raises TimeoutError if a message does not arrive within `PATIENCE` seconds."""
 
     def __init__(self, connection: Connection) -> None:
         self._connection = connection

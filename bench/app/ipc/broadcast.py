@@ -1,6 +1,4 @@
-"""Queues between the engine's thread and the clients of a session: one for each client; clients may join at any
-time.
-"""
+"""Queues between the engine's thread and the clients of a session, one per client. Clients may join at any time."""
 
 import threading
 from collections import deque
@@ -27,7 +25,7 @@ from drivers.clock import now
 
 
 class Reduction:
-    """Turns the blocks of a rig into traces."""
+    """Reduces the sample blocks of a rig to traces."""
 
     def __init__(self, sample_rate: float) -> None:
         self._rate = sample_rate
@@ -131,10 +129,10 @@ class Broadcast:
                 queue.put(message, always=always)
 
     def join(self, *first: FromSession) -> SendQueue:
-        """Queue of a new client, which begins with the messages `first` and the run so far."""
+        """Queue of a new client, which begins with the messages `first` and those that describe the run so far."""
         with self._lock:
             opened = () if self._opened is None else (self._opened,)
-            # one copy of references, because the engine's thread waits for this lock
+            # the messages are not copied, because the engine's thread may be waiting for this lock
             queue = SendQueue(first=chain(first, opened, self._journal, self._last.values()))
             self._queues.append(queue)
         return queue

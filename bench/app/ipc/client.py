@@ -92,7 +92,7 @@ class ClientConnection:
 
     @property
     def status(self) -> Literal["starting", "linked", "no link", "over"]:
-        """State of the connection: "no link" when the session has ended, or is silent, before its final message."""
+        """State of the connection: "no link" if the session is silent, or ended without its final message."""
         if self._over:
             return "over"
         if not self.lives:
@@ -111,7 +111,7 @@ class ClientConnection:
         self._outgoing.put(Leave())
 
     def _converse(self, connection: Connection) -> None:
-        """Receive messages until the connection ends; a thread sends meanwhile."""
+        """Receive messages until the connection ends, while another thread sends."""
         sender = threading.Thread(target=self._send, args=(connection,), name="link, sending", daemon=True)
         sender.start()
         try:
@@ -164,7 +164,7 @@ class ClientConnection:
 
 
 class SessionClient(ClientConnection):
-    """A session process and the connection to it: the owner of a run, or a plan check."""
+    """Connection to a session process that this client starts, for a run, which it then owns, or for a plan check."""
 
     def __init__(self, assignment: PlanCheck, on_message: Callable[[], None] = lambda: None) -> None:
         self._checks_plan = not isinstance(assignment, Run)
@@ -228,8 +228,8 @@ class SessionClient(ClientConnection):
 
 
 class AttachedClient(ClientConnection):
-    """A further client of a session that another client, or a terminal, has started; with `read_only`, the session
-    ignores its requests.
+    """Connection to a session that another window or a terminal has started; with `read_only`, the session ignores
+    requests of this client.
     """
 
     def __init__(

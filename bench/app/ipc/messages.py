@@ -56,7 +56,7 @@ class Run(PlanCheck):
 
 @dataclass(frozen=True)
 class Ask:
-    """The client requests an end: "stop", "abort" or "halt"."""
+    """Request of the client to end the run: "stop", "abort" or "halt"."""
 
     end: str
 
@@ -176,7 +176,7 @@ class Published:
 
 @dataclass(frozen=True)
 class Question:
-    """The plan waits for a person; the answer must contain the same `number`."""
+    """A question to the operator, for whose answer the plan waits; the answer must contain the same `number`."""
 
     number: int
     request: str
@@ -213,12 +213,12 @@ class Traces:
 
 @dataclass(frozen=True)
 class Beat:
-    """Heartbeat of the session process. While the rig is armed, the engine publishes every block.
+    """Heartbeat of the session process.
 
     state, reason : state of the engine, and reason for its last change.
     time : bench time [s].
     lost_events, lost_traces : numbers of events and of blocks of traces lost because the client did not read them.
-    quiet : time since the engine's last event [s].
+    quiet : time since the engine's last event [s]; while the rig is armed, every block of samples is an event.
     """
 
     state: State
@@ -234,7 +234,7 @@ class Ended:
     """The run has ended and its files are written.
 
     summary : contents of the summary file, which can be converted to JSON.
-    table : plain text.
+    table : the results as text for the terminal.
     passed : verdict of a protocol that tests the bench; True for any other protocol.
     cause : cause of the end; unknown if only the files report the end.
     """
@@ -281,8 +281,8 @@ FromClient = Ask | Answer | Note | Alive | ReadOnly | Leave
 
 
 def receive(connection: Connection) -> object | None:
-    """The next message; None for a message that only another version of the program defines, so that a session of that
-    version can be stopped nevertheless. Raises EOFError or OSError at the end of the connection.
+    """The next message; None for a message that this version of the program cannot read, so that a session of another
+    version can still be stopped. Raises EOFError or OSError at the end of the connection.
     """
     data = connection.recv_bytes()
     try:
@@ -297,7 +297,7 @@ relative to the table [m] and the drift, their difference [m]. Further channels 
 """
 
 BIN = 0.002
-"""Shortest bin [s]: less than a pixel in any plot of a second or longer."""
+"""Length of a bin [s] before rounding to whole samples: less than a pixel in any plot of a second or longer."""
 
 
 def extremes(values: NDArray[np.float64], width: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:

@@ -48,7 +48,9 @@ FAREWELL = 2.0
 """Longest wait at the end of the session for a client that does not read its messages [s]."""
 
 PERIOD = 0.5
-"""Shortest interval between readings of the safety inputs for the display [s]. The guard reads them in every block."""
+"""Shortest interval [s] between readings of the safety inputs for the display, and between progress reports of a phase.
+The guard reads the inputs in every block.
+"""
 
 
 class SafetyWatch:
@@ -66,8 +68,8 @@ class SafetyWatch:
         self.look(0.0, at_once=True)
 
     def look(self, time: float | None = None, *, at_once: bool = False) -> None:
-        """Send the inputs at bench time `time` [s], at most once per `PERIOD`. Errors of the rig are ignored, since
-        they are reported elsewhere.
+        """Send the inputs at bench time `time` [s], at most once per `PERIOD` unless `at_once`. Errors of the rig are
+        ignored, since they are reported elsewhere.
         """
         with suppress(RigError):
             self.update_driven(time, at_once=at_once)
@@ -138,7 +140,7 @@ class SessionServer:
         self._serve(connection, queue, lambda: self._receive_attached(connection, queue))
 
     def note(self, event: Event) -> None:
-        """Store the state for the next beat, which reports it even if events are lost."""
+        """Store the state for the next heartbeat, which reports it even if the event is lost."""
         self._noted = now()
         self._time = max(self._time, event.time)
         if isinstance(event, StateChanged):
@@ -278,7 +280,7 @@ class RemoteOperator:
 
 
 class Publisher:
-    """The subscriber that puts the engine's events into the send queue."""
+    """Subscriber that sends the engine's events to the clients of the session."""
 
     def __init__(self, host: SessionServer) -> None:
         self._host = host
@@ -286,7 +288,7 @@ class Publisher:
         self._phase, self._prepared = "", 0.0
 
     def prepare(self, phase: str, done: int = 0, total: int = 0, /) -> None:
-        """A `bench.progress.Progress` that sends a new phase immediately, and its parts at most once per `PERIOD`."""
+        """A `bench.progress.Progress`: sends a new phase at once, and its completed parts at most once per `PERIOD`."""
         if phase != self._phase or now() - self._prepared >= PERIOD:
             self._phase, self._prepared = phase, now()
             self._host.broadcast.put(Preparing(phase, done, total))

@@ -1,1 +1,1 @@
-"""Queue of tests in a file, which can be run from the command line and the window."""
+"""Queue of tests in a file, which the command line and the window can run."""

@@ -96,12 +96,12 @@ class Queue:
 
     @property
     def next(self) -> int | None:
-        """Index of the first pending test."""
+        """Index of the first pending test; None if there is none."""
         return next((i for i, test in enumerate(self._tests) if test.stage is Stage.WAITING), None)
 
     @property
     def running(self) -> int | None:
-        """Index of the running test."""
+        """Index of the running test; None if there is none."""
         return next((i for i, test in enumerate(self._tests) if test.stage is Stage.RUNNING), None)
 
     @property
@@ -119,7 +119,7 @@ class Queue:
         self._set(index, test)
 
     def remove(self, index: int) -> None:
-        """Remove any test except the running one."""
+        """Remove a test. Raises InvalidInput for the running one."""
         if self._tests[index].stage is Stage.RUNNING:
             raise _refused(index, self._tests[index], "the test is running: stop it first")
         self._change([*self._tests[:index], *self._tests[index + 1 :]])
@@ -193,7 +193,7 @@ def _another(folder: str | None, taken: set[str | None]) -> str | None:
 
 @dataclass(frozen=True)
 class Ready:
-    """A test accepted for the bench, with valid parameters and prepared."""
+    """A test that was checked against the bench: its protocol, prepared with the parameters of the test."""
 
     protocol: "Protocol[Any]"
     prepared: "Prepared[Any]"

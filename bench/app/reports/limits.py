@@ -15,7 +15,7 @@ from bench.document.typography import (
 )
 
 MOST_LISTED = 40
-"""Maximum numbers of listed damaged datasets and of listed warnings; further warnings are only counted."""
+"""Maximum number of listed damaged datasets, and of listed warnings; further ones are only counted."""
 
 GRAVE = ("Warned", "LimitExceeded")
 ENDINGS = ("-> aborting", "-> halted")
@@ -33,7 +33,7 @@ def limits_section(campaign: Campaign) -> Section:
             Listing(list(damaged.values())[:MOST_LISTED]),
         ]
         if len(damaged) > MOST_LISTED:
-            parts.append(f"The file contains {len(damaged) - MOST_LISTED} more damaged datasets.")
+            parts.append(f"Number of further damaged datasets: {len(damaged) - MOST_LISTED}.")
     if record.status not in ("completed",):
         parts.append(Notice(f"The campaign was not completed: {record.status}. {typeset(record.summary)}".strip()))
     warnings = list(_warnings(campaign))
@@ -43,7 +43,7 @@ def limits_section(campaign: Campaign) -> Section:
             Listing(warnings[:MOST_LISTED]),
         ]
         if len(warnings) > MOST_LISTED:
-            parts.append(f"The file contains {len(warnings) - MOST_LISTED} more warnings.")
+            parts.append(f"Number of further warnings: {len(warnings) - MOST_LISTED}.")
     else:
         parts.append("No warning was issued and no limit was exceeded.")
     parts.append(
@@ -59,7 +59,7 @@ def limits_section(campaign: Campaign) -> Section:
 
 
 def _margins(campaign: Campaign) -> Iterator[Table]:
-    """Demands predicted by the preflight, by limited quantity."""
+    """Table of the predicted demand on every limited quantity, and its margin; none if the file has no such data."""
     table = campaign.record.tables.get("preflight", {})
     needed = ("quantity", "demand", "limit", "unit", "margin", "where")
     if not set(needed) <= table.keys():

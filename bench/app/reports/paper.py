@@ -25,7 +25,7 @@ from sim.loading import load_model
 from sim.specimen import Specimen
 
 Named = tuple[str, Statement]
-"""A statement with its number."""
+"""Number of a statement of the paper, as text, and the statement."""
 
 
 def verdicts_table(named: Sequence[Named]) -> Table:
