@@ -22,7 +22,7 @@ def result_names(protocol: "Protocol[Any]") -> tuple[str, ...]:
 
 
 def default_folder(protocol: str, now: datetime) -> Path:
-    """`runs/<protocol>-<date>T<time>`; the time has hyphens, because a colon is not allowed on every system."""
+    """Default results folder `runs/<protocol>-<date>T<time>`; the time has hyphens, as some systems forbid colons."""
     return Path("runs", f"{protocol}-{now:%Y-%m-%dT%H-%M-%S}")
 
 

@@ -36,7 +36,7 @@ File = str | PathLike[str]
 Numbers = float | str | Sequence[float] | NDArray[Any]
 """A number, several numbers, or a range as on the command line ("12:21:181")."""
 Record = File | Accelerogram | tuple[NDArray[Any], float]
-"""A file, `FILE@unit=g`, `synthetic:NAME`, or acceleration [m/s2] and time step [s]."""
+"""An earthquake record: a file, `FILE@unit=g`, `synthetic:NAME`, or accelerations [m/s2] and their time step [s]."""
 
 OF_SINE = ("amplitude_factor", "members")
 """Names of the options of a prediction for a sine."""
@@ -60,7 +60,7 @@ class Branch:
     specified by a single number is dropped.
 
     alpha_2_low, alpha_2_high : uncertainty band of alpha_2; NaN unless requested.
-    multiplier : greatest |Floquet multiplier|.
+    multiplier : largest magnitude of the Floquet multipliers.
     """
 
     alpha_1: Quantity
@@ -76,7 +76,7 @@ class Branch:
 
 @dataclass(frozen=True, eq=False)
 class SteadyPrediction:
-    """Steady motions under a sine, with the block rocking and at rest. Both, one or neither exist at a point."""
+    """Steady motions under a sine, with the block rocking and at rest. At a point, both, one or neither may exist."""
 
     omega: Quantity
     beta: Quantity
@@ -86,7 +86,8 @@ class SteadyPrediction:
 
 @dataclass(frozen=True, eq=False)
 class SeismicPrediction:
-    """Gain under a record, arrays of shape (n_beta,), or () for a single stiffness; NaN where the block overturned.
+    """Gain under an earthquake record; arrays of shape (n_beta,), or () for a single stiffness, NaN where the block
+    overturned.
 
     `motion` is the acceleration of the table: the record limited to the band and scaled.
     """

@@ -208,7 +208,7 @@ def _aged(configuration: BenchConfiguration) -> tuple[str, ...]:
 
 
 def _unpredicted(configuration: BenchConfiguration) -> tuple[str, ...]:
-    """Warnings about the limits of further channels, for which no margin is predicted."""
+    """Warnings about limits on additional channels of the configuration, for which no margin is predicted."""
     return tuple(
         f"a run ends if the limit on {channel.name} is exceeded, but no margin to this limit is predicted"
         for channel in configuration.channels

@@ -25,7 +25,7 @@ class PageOptions:
         str,
         Parameter(
             metavar="ADDRESS",
-            help="Network address on which the page is served; 0.0.0.0 stands for all networks of this computer.",
+            help="Network address on which the page is served; 0.0.0.0 means all network interfaces of this computer.",
             show_default="127.0.0.1, for browsers on this computer only",
         ),
     ] = "127.0.0.1"

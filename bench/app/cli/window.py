@@ -87,7 +87,7 @@ def gui(
         print_warning(line)
     # the window selects the first protocol: the campaign of the paper
     protocols = sorted(protocols, key=lambda each: each.name != "harmonic")
-    # Ctrl-C ends the process until the window installs its own handler: an exception during the import aborts PySide6
+    # Ctrl-C ends the process until the window installs its own handler: an exception would abort the import of PySide6
     with leaving():
         from bench.app.gui.window import open_window
 

@@ -10,7 +10,7 @@ _SECONDS, _THETA = (TWIN_TRACE.index(name) for name in ("seconds", "theta"))
 STEP = 0.01
 """Interval between two stored angles of the twin [s]."""
 KEPT = 500
-"""Number of stored angles, for 5 s."""
+"""Number of stored angles, which cover 5 s."""
 BEHIND = 2.0
 """Largest lag of the twin [s] for which the display waits for its angle, in bench time. The twin lags behind the
 measurement when a run is faster than real time.

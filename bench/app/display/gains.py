@@ -21,7 +21,7 @@ LOW, HIGH = "alpha_2_low", "alpha_2_high"
 LEAST = 1e-3
 """Lower bound of drawn gains, because the axis of a spectrum is logarithmic; smaller ones are drawn at this value."""
 NOT_PLAYED = "not played"
-"""Status of points without a measurement, which are not drawn."""
+"""Status of points whose motion was not played; they are not drawn."""
 _SPECTRUM = frozenset({"omega", "beta", "alpha_2", "layer"})
 _CURVE = frozenset({"record", "beta", "alpha_2"})
 

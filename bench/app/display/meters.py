@@ -68,7 +68,7 @@ class Meter:
 
     @property
     def level(self) -> str:
-        """Style level for the present magnitude."""
+        """Level (colour) of the meter for the present magnitude."""
         share = self.value / self.limit
         return "alarm" if share >= 1.0 else "wait" if share >= self.warning else "good"
 

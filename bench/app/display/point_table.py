@@ -46,8 +46,8 @@ class Measured:
 
     @property
     def score(self) -> float:
-        """Normalised error E_n: measured minus predicted over the root sum of squares of their expanded uncertainties.
-        NaN if one of them is missing.
+        """Normalised error E_n: (measured - predicted), divided by the root sum of squares of the expanded
+        uncertainties of both. NaN if any of these is missing.
         """
         combined = hypot(self.uncertainty, self.predicted_uncertainty)
         return (self.value - self.predicted) / combined if combined > 0.0 else nan

@@ -38,8 +38,8 @@ class Status:
 def bench_status(
     link: Literal["none", "starting", "linked", "no link", "over"], state: State, reason: str, silence: float
 ) -> Status:
-    """Status to be displayed for a state and a connection; `silence` is the time since the last message [s]. While the
-    connection is missing, the status names its loss instead of the last known state.
+    """Status to be displayed for a state and a connection; `silence` is the time since the last message [s]. If the
+    connection is lost, the status states this instead of the last known state.
     """
     match link:
         case "none":

@@ -94,7 +94,7 @@ MARGIN_TIP = (
     "uncertainty of the specimen's parameters."
 )
 TIME_AND_DISK = "Expected duration {duration}. Disk: up to {needed:.0f} MB needed, {free:.0f} MB free."
-TIGHTEST = "Tightest: {name}, limited by {owner}."
+TIGHTEST = "Tightest margin: {name}, limited by {owner}."
 MAY_RUN, MAY_NOT = "The plan is within all limits.", "Refused: {why}"
 NO_MARGINS = "This protocol does not predict margins."
 
@@ -137,7 +137,7 @@ NO_CHANGE = "< 0.01 %"
 SENSORS = ("table acceler.", "table displ.", "laser 1", "laser 2")
 STEADY_TIP = (
     "For each sensor, the mean cycles of two windows of {window} cycles are compared; steady means that they agree "
-    "within a third of {tolerance:g} % (settle tolerance). This display uses the traces; the run uses the samples."
+    "within a third of {tolerance:g} % (settle tolerance). Computed from the traces; the run itself uses all samples."
 )
 LOST_PARTS, AND = ("{n} event(s)", "{n} block(s) of traces"), " and "
 LOST = "Not shown: {what}; the file contains all of them."
@@ -152,7 +152,7 @@ ON_BLOCK = {
     "storey 2, u2": "laser 2, block {height:.0f} mm above the table",
     "drift, u2 − u1": "laser 2 − laser 1, not the drift",
 }
-"""Labels of the laser 2 traces while it measures the block."""
+"""Labels of the traces that depend on laser 2, while laser 2 measures the block, by their usual labels."""
 FRAME_AND_BLOCK = "Frame: measured. Block: model, driven by the measured table motion"
 FACTOR = "magnification"
 FACTOR_TIP = "Magnification of the motion; also with the mouse wheel, or the keys + and −, on the picture."
@@ -202,9 +202,9 @@ RUN_ITEM = "run {number}, {seconds:.0f} s"
 SINCE_ARMED = "seconds since the rig was armed"
 REPORT, EXPORT = "Create report", "Export"
 REPORT_TIP = (
-    "Runs `rockbench report` on the selected file, into the same folder; possible during a test, at low priority."
+    "Runs `rockbench report` on the selected file and writes to the same folder; at low priority, also during a run."
 )
-EXPORT_TIP = "Runs `rockbench export` on the selected file, into a new folder next to it."
+EXPORT_TIP = "Runs `rockbench export` on the selected file and writes to a new folder next to it."
 MAKING, MADE, NOT_MADE = "Creating {path} …", "Created: {path}", "No file was written. {text}"
 OPEN_MADE = "Open"
 RESULTS_EMPTY = "No file is open. The results of a run appear here when it has ended."
@@ -219,9 +219,9 @@ RUN_TITLES = ("", "protocol", "status", "result", "specimen", "operator", "date"
 RUN_TITLE_TIPS = (
     "Tick a run to draw it together with the other ticked ones and to compare it with the reference.",
     "protocol",
-    "status of the run; running: its file is being written",
+    'status of the run; "running": its file is being written',
     "main result, with expanded uncertainty (k = 2) and agreement with the prediction",
-    "width and height of the block, stiffness of the first storey; identified: from a specimen file",
+    'width and height of the block, stiffness of the first storey; "identified": from a specimen file',
     "operator",
     "start of the run",
     "folder of the results",
@@ -229,7 +229,7 @@ RUN_TITLE_TIPS = (
 RUN_FOREIGN, RUN_DAMAGED, RUN_FILE = "not a run", "damaged", "the file"
 RUN_GOING, RUN_GOING_WHY = "running", "its file is being written"
 RUN_CUT = "not closed"
-RUN_CUT_WHY = "its writer was killed or is no longer writing; `rockbench file recover` writes a clean file"
+RUN_CUT_WHY = "its writer was killed or has stopped writing; `rockbench file recover` writes a clean file"
 RUN_PASSED, RUN_NOT_PASSED = "✓ passed", "▲ NOT PASSED"
 RUN_RANGE = "{name} {low} to {high}{unit}, {n} values"
 RUN_AGREEING = "{agree} of {judged} agree"
@@ -260,7 +260,7 @@ USE_BACK_TIP = "Uses the values of the configuration again for all following run
 USED = 'Runs now use {files}. "Configured values" undoes this.'
 FURTHER, FURTHER_TIP = "and …", "Adds channels: in the plot of the first channel or, for another unit, below it."
 OVERLAY, OVERLAY_TIP = "ticked runs", "Also draws the same channels and run of the other ticked files."
-CURSORS, CURSORS_TIP = "cursors", "Shows two cursors, A and B, to drag; the line below gives the samples at both."
+CURSORS, CURSORS_TIP = "cursors", "Shows two movable cursors, A and B; the line below gives the samples at both."
 SPECTRUM = "spectrum"
 SPECTRUM_TIP = (
     "Amplitude spectrum of all samples in the visible range (Hann window, mean removed): the line of a sine has the "
@@ -287,7 +287,7 @@ TOUR = (
     "Watch the gain converge to its prediction on the Run page",
     "Read the verdict on the Results page, then open Figure",
 )
-TOUR_SHOW, TOUR_SHOW_TIP = "Show me", "Opens the page of the current step, on which its control is framed."
+TOUR_SHOW, TOUR_SHOW_TIP = "Show me", "Opens the page of the current step; the control to be used is framed."
 TOUR_COMPLETE = "The tour is complete. Change a value on the Protocol page, and check the plan again for your own test."
 WELCOME_CLOSE = "Hide"
 CONFIGURATION = "Configuration"
@@ -334,7 +334,7 @@ CHECK_LOOP_ENDED = "{passed} passed, {failed} failed, {other} without verdict. {
 CHECK_IN = "Results are in {out}."
 CHECK_CUT = "The check was interrupted."
 CHECK_TABLE_TIP = "The tooltip of a failed line gives the remedy."
-ASK_CHECK_TIP = "The frame is clamped and unclamped by hand, so on this bench the check always asks."
+ASK_CHECK_TIP = "On this bench, the frame is clamped and unclamped by hand, so the check always asks the operator."
 CHECK_TITLES = ("verdict", "signal", "quantity", "measured", "U (k = 2)", "allowed")
 
 DEFAULTS, DEFAULTS_TIP = "Defaults", "Fills the form with the defaults of the protocol."
@@ -348,14 +348,14 @@ PRESET, PRESET_HINT = "Presets", "preset: select or name"
 PRESET_TIP = "Select a preset to fill the form with it, or type a name to save the values of the form."
 PRESET_SAVE, PRESET_SAVE_TIP = (
     "Save",
-    "Saves the values of the form as the named preset. To replace a preset that was not loaded, press it twice.",
+    "Saves the values of the form as the named preset. To replace a preset that was not loaded, press Save twice.",
 )
 PRESET_DELETE, PRESET_DELETE_TIP = "Delete", "Deletes the file of the named preset; the form keeps its values."
 PRESET_LOADED, PRESET_SAVED, PRESET_DELETED = "Preset {name}.", "Saved: {path}", "Deleted: {name}"
 PRESET_NO_NAME, PRESET_NONE = "type a name first", "there is no preset with this name"
 PRESET_EXISTS = "A preset {name} exists; press Save again to replace it."
 PRESET_INVALID = "Invalid values are marked in the form."
-PRESET_UNKNOWN = "Not in this protocol: {values}."
+PRESET_UNKNOWN = "Ignored, because the protocol has no such parameter: {values}."
 HELP, HELP_TIP = "?", "Help on the parameter whose field has the focus (F1)."
 HELP_DEFAULT, HELP_USUAL = "Default: {default}.", "Usual: {low} to {high}{unit}; other values cause a notice."
 HELP_TYPED = "Command line: `--{option}`. Protocol file: `{key}`."
@@ -372,7 +372,7 @@ SOUNDS_TIP = (
 RECENT, RECENT_TIP = "Recent configurations", "Opens a configuration that was used before."
 
 ADD, ADD_TIP = "Add to queue", "Appends the checked plan to the queue (Ctrl+J)."
-SAVE, SAVE_TIP = "Save in queue", "Replaces test {number} of the queue by the checked plan (Ctrl+J)."
+SAVE, SAVE_TIP = "Save in queue", "Replaces test {number} of the queue with the checked plan (Ctrl+J)."
 LEAVE, LEAVE_TIP = "Discard changes", "Ends editing; the test in the queue stays unchanged (Esc)."
 TAKE_IN = "Restore"
 QUEUE_TIP = "Tests run from top to bottom. Enter opens a pending test in the form."
@@ -426,9 +426,7 @@ POINT_MARKS = {
     "overturned": ("✕", "alarm"),
     "not played": ("–", "calm"),
 }
-"""Mark of a point and level of its style, by status of the point; all other statuses have the mark and level of a
-finished point.
-"""
+"""Mark and level (colour) of a point, by its status; all other statuses have those of a finished point."""
 EXPECTED = "≈ {time:%H:%M}"
 METERS = {
     "displacement": "table displacement",

@@ -32,7 +32,7 @@ Kind = Literal["number", "whole", "switch", "text"]
 
 @dataclass(frozen=True)
 class Signal:
-    """One column of samples: a channel or the drive. `read` returns rows of the file.
+    """One column of samples: a channel or the drive. `read` returns the samples in a slice of rows of the file.
 
     For raw counts, `conversion` describes the conversion to physical values; its entry `value_unit` is their unit.
     """

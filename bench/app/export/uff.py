@@ -35,7 +35,7 @@ def write(content: Content, folder: Path) -> None:
     """Write run-<number>.uff, and the tables as text. Raises InvalidInput for a signal with more than `MOST_PARTS`
     parts.
     """
-    pyuff: Any = import_module("pyuff")  # an optional dependency without type information
+    pyuff: Any = import_module("pyuff")  # `Any`: pyuff is an optional dependency without type information
     for run in content.runs:
         with (folder / f"run-{run.number}.uff").open("wb") as file:
             _append(pyuff, file, _units(pyuff), folder)

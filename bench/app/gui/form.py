@@ -163,7 +163,7 @@ def _name(entry: Declared) -> str:
 
 
 def _tip(entry: Declared) -> str:
-    """Description, limits and default."""
+    """Tooltip of a field: description, valid values and default."""
     lines = [
         f"{typeset(entry.description[:1].upper() + entry.description[1:])}.",
         texts.MUST_BE.format(allowed=typeset(entry.allowed_in_unit)),

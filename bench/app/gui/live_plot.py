@@ -20,7 +20,7 @@ from bench.live_view import Panel
 INSIDE = (60, 8, 8, 44)
 """Distances of the notice from the edges of the plot [px], so that it does not cover the axes."""
 KEYS = {"line": "──", "points": "●", "predicted": "╌╌"}
-"""Keys of the legend by style."""
+"""Symbols of the legend, by style of the curve."""
 LEGEND = 4
 """Largest number of curves in the legend; the tooltip has all of them."""
 

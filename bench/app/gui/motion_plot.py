@@ -49,7 +49,7 @@ class MotionPlot(pg.PlotWidget):
         super().__init__(enableMenu=False)
         self.kind: Kind = kind
         self.omega: float | None = None
-        """Circular frequency of the base motion [rad/s]; None outside a steady sine."""
+        """Circular frequency of the base motion [rad/s]; None unless a steady sine is being measured."""
         self._model = np.zeros((0, 3))
         self._item: Any = self.getPlotItem()
         self._item.hideButtons()

@@ -63,7 +63,7 @@ class ProtocolPage(QWidget):
         self._checking = self._began = self._unattended = False
         self._edited_test: Queued | None = None
         self._made: Path | None = None
-        # created before the choice of the protocol, which the Tab key leaves for the values
+        # created before the choice of the protocol, so that the values follow that choice in the tab order
         self.presets = PresetBar(presets)
         self.choice = QComboBox()
         self.choice.addItems([entry.name for entry in entries])

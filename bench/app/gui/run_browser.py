@@ -50,12 +50,12 @@ def read_rows(found: Sequence[Found]) -> list[RunRow]:
 
 
 class _Table(QTableView):
-    """Table whose Enter key acts on the selected run."""
+    """Table of runs, with a signal for the Enter key."""
 
     entered_row = Signal(QModelIndex)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Emit `entered_row` for Enter."""
+        """Emit `entered_row` with the selected row if Enter is pressed."""
         if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter) and self.currentIndex().isValid():
             self.entered_row.emit(self.currentIndex())
         else:

@@ -40,7 +40,7 @@ class VerdictLabel(QLabel):
             self._fit()
 
     def allow(self, page: int) -> None:
-        """Limit the height to the share `SPACE` of the height `page` of the page [px]."""
+        """Limit the height to `SPACE` times `page`, the height of the page [px]."""
         self._space = round(SPACE * page)
         self._fit()
 

@@ -153,7 +153,7 @@ def scrolling(content: QWidget, width: int, height: int) -> QScrollArea:
 
 
 class _Holder(QWidget):
-    """Fills itself with `content`, at least `width` x `height` [px]. It has no layout: with a layout, the scroll area
+    """Widget of at least `width` x `height` [px] that `content` fills. It has no layout: with a layout, the scroll area
     would give wrapped text its preferred height and would scroll even if the contents fit.
     """
 

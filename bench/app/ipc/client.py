@@ -39,7 +39,7 @@ from drivers.child import OWN_CONSOLE
 from drivers.clock import now
 
 KEPT = 20_000
-"""Maximum number of buffered messages; beyond it the oldest are discarded."""
+"""Maximum number of buffered messages; if there are more, the oldest are discarded."""
 
 # Ctrl-C in the terminal must reach only the client, which sends a request to the session
 _OWN_GROUP = 0x200 if sys.platform == "win32" else 0

@@ -128,7 +128,7 @@ class Attached:
 
 @dataclass(frozen=True)
 class Control:
-    """Whether an attached client may answer questions and request the smooth ramp, because the owner's window is lost.
+    """Whether an attached client may answer questions and request the ramp-out, because the owner's window is lost.
     Every client that is not read-only may abort or halt the run.
     """
 
@@ -176,7 +176,7 @@ class Published:
 
 @dataclass(frozen=True)
 class Question:
-    """A question to the operator, for whose answer the plan waits; the answer must contain the same `number`."""
+    """A question to the operator. The plan waits for the answer, which must contain the same `number`."""
 
     number: int
     request: str

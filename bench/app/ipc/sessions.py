@@ -83,7 +83,7 @@ def running_sessions() -> list[RunningSession]:
 
 
 def lock_of(path: Path) -> ProcessLock:
-    """Lock the announcement `path`. Raises LockHeld while its session runs, and OSError."""
+    """Lock the announcement `path`. Raises LockHeld while its session runs, and OSError if it cannot be locked."""
     return ProcessLock(path.with_suffix(""))
 
 
