@@ -77,7 +77,7 @@ def check_folder(folder: Path, results: Iterable[str]) -> None:
                 raise InvalidInput(
                     "--out",
                     str(folder),
-                    f"the folder already contains {name}; results are never overwritten, so choose another folder",
+                    f"it already contains {name}; results are never overwritten, so choose another folder",
                 )
         while not existing.exists() and existing != existing.parent:
             existing = existing.parent

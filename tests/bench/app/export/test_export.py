@@ -282,7 +282,7 @@ def test_a_signal_in_too_many_parts_is_refused_for_uff(
 ) -> None:
     monkeypatch.setattr(uff, "MOST_PARTS", 1)
     assert main(["export", str(campaign), "--to", "uff", "--out", str(tmp_path / "out")]) == 2
-    assert "laser_1 is interrupted in 2 places" in capsys.readouterr().err
+    assert "missing samples divide laser_1 into 2 parts" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
 
 

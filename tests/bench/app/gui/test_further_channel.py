@@ -222,4 +222,4 @@ def test_a_dry_run_says_that_its_limit_is_not_predicted(tmp_path: Path, capsys: 
     ]
     assert main(["run", "harmonic", *asked, "--dry-run"]) == 0
     said = capsys.readouterr()
-    assert f"the limit on {NAME} ends a run" in " ".join((said.out + said.err).split())
+    assert f"a run ends if the limit on {NAME} is exceeded" in " ".join((said.out + said.err).split())
