@@ -127,7 +127,7 @@ def test_a_beat_tells_the_state_when_the_change_was_lost(window: Window, link: S
     link.said = [Beat(State.HALTED, "the end switch opened", 9.0, 12, 3)]
     window._controller._look()
     assert window.header.word.text() == "HALTED"
-    assert "12 events and 3 blocks" in window.run.lost.text()
+    assert "12 event(s) and 3 block(s)" in window.run.lost.text()
 
 
 def test_stop_is_in_view_on_small_screens(window: Window, link: ScriptedClient, qtbot: QtBot) -> None:
