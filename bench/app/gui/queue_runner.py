@@ -192,13 +192,15 @@ class QueueRunner(QObject):
         self._begun = None
         if begun[1].test.out is None:
             remove_unused(begun[0].out)
+        passed = True
         if isinstance(ended, Refused):
             status, good, outcome = ("failed" if ended.failed else "refused"), False, ended.text
         else:
             passed = ended.passed
             status, good = ended.status, passed and ended.status in GOOD
             outcome = ended.reason if passed else "not passed"
-        why = "" if status == "completed" and good else texts.QUEUE_ENDED.format(number=index + 1, status=status)
+        stated = status if passed else "not passed"
+        why = "" if stated == "completed" and good else texts.QUEUE_ENDED.format(number=index + 1, status=stated)
         self._finish_test(index, good=good, outcome=f"{status}: {outcome}", why=why)
 
     def _finish_test(self, index: int, *, good: bool, outcome: str, why: str) -> None:

@@ -19,7 +19,7 @@ MOST_LISTED = 40
 
 GRAVE = ("Warned", "LimitExceeded")
 ENDINGS = ("-> aborting", "-> halted")
-SHORT = 60
+MINUTE = 60
 """Number of seconds per minute."""
 
 
@@ -103,5 +103,5 @@ def _warnings(campaign: Campaign) -> Iterator[str]:
     for event in campaign.record.events:
         stopped = event.kind == "StateChanged" and any(word in event.text for word in ENDINGS)
         if event.kind in GRAVE or stopped:
-            minutes, seconds = divmod(event.time, SHORT)
+            minutes, seconds = divmod(event.time, MINUTE)
             yield f"{int(minutes)}:{seconds:04.1f} min  {typeset(event.text)}"

@@ -147,6 +147,18 @@ def test_a_test_that_does_not_end_well_pauses_the_queue(
     assert _stages(filled)[1] is Stage.RUNNING
 
 
+def test_a_test_that_is_not_passed_pauses_the_queue_with_this_reason(
+    filled: Window, spoken: type[ScriptedClient], qtbot: QtBot
+) -> None:
+    _start(filled, spoken, qtbot)
+    run = spoken.latest.assignment
+    assert isinstance(run, Run)
+    _hear(filled, spoken, Ended("completed", "", {"points": []}, "", run.out, passed=False))
+    qtbot.waitUntil(lambda: not filled.runner.going, timeout=LONG_MS)
+    assert _stages(filled) == [Stage.FAILED, Stage.WAITING, Stage.WAITING]
+    assert 'the status of test 1 is "not passed"' in filled.queue.status.text()
+
+
 @pytest.mark.parametrize(
     "answer", [REFUSED, Refused("omega = 2 is refused: too slow", Cause("invalid_input", "omega"))]
 )
