@@ -83,7 +83,8 @@ def band_lines(samples: int, sample_rate: float, band: tuple[float, float], *, o
     if odd:
         lines = lines[lines % 2 == 1]
     if lines.size == 0:
-        raise InvalidInput("band of the multisine", band, f"it contains no line: the lines are {spacing:g} Hz apart")
+        apart = f"{spacing * (2 if odd else 1):g} Hz apart"
+        raise InvalidInput("band of the multisine", band, f"it contains no line: the lines are {apart}")
     return lines.astype(np.int64)
 
 

@@ -197,9 +197,8 @@ def _statement(campaign: Campaign, points: Sequence[Mapping[str, Any]]) -> list[
 
 Floats = NDArray[np.float64]
 
-QUIET = 1.5
-"""Time at the start of a run from which the zero of the signals is taken [s]; by default, the table is at rest for 2 s.
-"""
+QUIET = 0.75
+"""Fraction of the time at rest at the start of a run from which the zero of the signals is taken."""
 
 
 @dataclass(frozen=True)
@@ -241,13 +240,15 @@ def played_records(record: DataFile) -> list[Played]:
     return [one for one in found if one.start >= one.run]
 
 
-def signals_of(record: DataFile, signals: SignalMap, played: Played) -> Floats:
-    """Signals of a played record, shape (n, n_signals), relative to their values at rest."""
+def signals_of(record: DataFile, signals: SignalMap, played: Played, rest: float) -> Floats:
+    """Signals of a played record, shape (n, n_signals), relative to their values at rest; each run begins with `rest`
+    seconds at rest.
+    """
 
     def values(start: int, stop: int) -> Floats:
         return np.column_stack([record.values(channel.name, slice(start, stop)) for channel in record.channels])
 
-    signals.tare(values(played.run, played.run + round(QUIET * record.sample_rate)))
+    signals.tare(values(played.run, played.run + round(QUIET * rest * record.sample_rate)))
     return signals.of(values(played.start, played.stop))
 
 
@@ -267,7 +268,8 @@ def histories_parts(campaign: Campaign) -> list[Part]:
     names = list(dict.fromkeys(row["record"] for row in campaign.seismic_points))
     plays = played_records(record)
     try:
-        known = {shaking.name: shaking for shaking in _shakings(campaign)}
+        parameters = validated(EarthquakeParameters, campaign.parameters)
+        known = {shaking.name: shaking for shaking in _shakings(campaign, parameters)}
     except InvalidInput as refused:
         return [Notice(f"Histories are not drawn because records are missing: {refused}.")]
     every = max(round(STEP * record.sample_rate), 1)
@@ -278,7 +280,7 @@ def histories_parts(campaign: Campaign) -> list[Part]:
         if shaking is None:
             continue
         for play in _bare_and_softest([play for play in plays if play.name == name]):
-            shown = signals_of(record, signals, play)
+            shown = signals_of(record, signals, play, parameters.rest)
             if play.beta is None:
                 asked = shaking.target.acceleration
                 achieved = shown[: asked.size : every, ACCELERATION]
@@ -304,13 +306,12 @@ def histories_parts(campaign: Campaign) -> list[Part]:
     return parts
 
 
-def _shakings(campaign: Campaign) -> tuple[Shaking, ...]:
+def _shakings(campaign: Campaign, parameters: EarthquakeParameters) -> tuple[Shaking, ...]:
     """Records of the campaign from the data file; an older file does not contain them, so they are read again.
 
     Raises InvalidInput for missing records.
     """
     assert campaign.configuration is not None
-    parameters = validated(EarthquakeParameters, campaign.parameters)
     return shakings(parameters, campaign.configuration, FileSources.stored(campaign.record.tables))
 
 

@@ -22,7 +22,7 @@ UNKNOWN = "unknown"
 EXACT = 10
 """Number of significant digits of a printed parameter, enough to reproduce the number as it was typed."""
 
-_DEVICES = {"backend": "kind of bench", "seed": "random seed"}
+_DEVICES = {"backend": "kind of bench"}
 """Labels of those entries of a bench description that are not devices."""
 
 

@@ -126,7 +126,8 @@ def test_an_end_before_its_time_and_warnings_are_told(file: Path) -> None:
     assert "1:01.5 min  the table's temperature is near its limit" in said
 
 
-def test_what_was_played_begins_at_the_sample_at_which_its_drive_began(tmp_path: Path) -> None:
+@pytest.mark.parametrize("rest", [2.0, 0.5])
+def test_what_was_played_begins_at_the_sample_at_which_its_drive_began(tmp_path: Path, rest: float) -> None:
     """A table that repeats the drive sample by sample: what the report takes of it is the drive that was handed over.
 
     Neither play fills its last block, the second has a beginning of its own within a longer run.
@@ -147,7 +148,7 @@ def test_what_was_played_begins_at_the_sample_at_which_its_drive_began(tmp_path:
     def plan() -> Plan:
         for (name, beta), drive in volts.items():
             yield OperatorAction(OperatorTask.REMOVE_BLOCK, Specimen().bare(), "Take the block off.")
-            yield Arm(2.0)
+            yield Arm(rest)
             yield Play(drive, GainMonitor(name, beta, rate))
             yield RampOut()
 
@@ -158,7 +159,7 @@ def test_what_was_played_begins_at_the_sample_at_which_its_drive_began(tmp_path:
         assert [(play.name, play.beta) for play in plays] == list(volts)
         signals = SignalMap(record.channels, bench.laser_reference)
         for play, drive in zip(plays, volts.values(), strict=True):
-            shown = signals_of(record, signals, play)
+            shown = signals_of(record, signals, play, rest)
             assert len(shown) == drive.size
             # the loopback's counts are thousandths
             np.testing.assert_allclose(shown[:, ACCELERATION], drive, atol=5.1e-4)
