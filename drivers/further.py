@@ -57,7 +57,7 @@ class FurtherChannel(CalibratedInput):
     def _check_limit(self) -> "FurtherChannel":
         reach = (self.range - abs(self.zero)) / abs(self.sensitivity)
         if self.limit is not None and self.limit > reach:
-            scale = f"range = {self.range:g} V and sensitivity = {self.sensitivity:g}"
+            scale = f"range = {self.range:g} V, zero = {self.zero:g} V and sensitivity = {self.sensitivity:g}"
             allowed = f"with {scale} the channel measures only up to {reach:.4g} {self.unit}; reduce the limit"
             raise InvalidInput("limit", self.limit, allowed)
         return self

@@ -140,12 +140,12 @@ def steady_gains(
     done: Done | None = None,
     scheduler: str | None = None,
 ) -> Floats:
-    """alpha_1 and alpha_2 of m specimens on the branches of n orbits, shape (n, m, 2), computed on all processors.
+    """alpha_1 and alpha_2 of m specimens on the branches of n orbits, shape (n, m, 2), computed in parallel.
 
     `members[i]` are the specimens near `orbits[i]`, at the frequency and amplitude of that orbit. `bare_amplitude`
-    [m/s2] is the amplitude of the test without block, if different. The gains are NaN where a member does not have the
-    motion of the branch: its block does not rest, or continuation does not reach its orbit. `done` is called as parts
-    of the work are completed.
+    [m/s2] is the amplitude of the test without the block, if different. The gains are NaN where a member does not have
+    the motion of the branch: its block does not rest, or continuation does not reach its orbit. `done` is called as
+    parts of the work are completed.
     """
     every = [(orbit, specimen) for orbit, own in zip(orbits, members, strict=True) for specimen in own]
     parts = max(processors(scheduler), len(every) // CHUNK)

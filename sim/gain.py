@@ -128,7 +128,7 @@ def seismic_curve(
     if bare.status is not Status.COMPLETED or not min(bare.peaks.u1, bare.peaks.drift) > 0.0:
         raise InvalidInput(
             "record",
-            f"peaks of the bare frame {bare.peaks}",
+            f"peak u1 {bare.peaks.u1:.3g} m and peak drift {bare.peaks.drift:.3g} m of the bare frame",
             "the response of the bare frame must be finite and not zero",
         )
     coupled = [specimen.coupled(float(beta)) for beta in betas]

@@ -54,7 +54,7 @@ SMALLEST_ADVANCE = 1e-3
 """Maximum number of Newton iterations, and lower limit on the steps of `follow` as a fraction of the path."""
 
 MOST_KNOWN = 5
-"""Number of points used by an extrapolation; more would amplify the rounding errors of the Jacobians."""
+"""Largest number of points used by an extrapolation; more would amplify the rounding errors of the Jacobians."""
 
 
 @dataclass(frozen=True, eq=False)

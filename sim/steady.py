@@ -120,7 +120,8 @@ def rocking_orbit(specimen: Specimen, omega: float, amplitude: float, guess: Orb
 
 
 def rocking_branch(specimen: Specimen, omegas: Sequence[float] | NDArray[np.float64], amplitude: float) -> list[Orbit]:
-    """Rocking orbits at `omegas` [rad/s], in the given order, each extrapolated from the previous ones.
+    """Rocking orbits at `omegas` [rad/s], in the given order. The initial value of each is extrapolated from the
+    previous ones.
 
     Raises the errors of `rocking_orbit`.
     """

@@ -166,10 +166,10 @@ class TablePeriod:
         return after, samples
 
     def run(self, start: Array, drive: NDArray[np.complex128], change: Array | None = None) -> tuple[Array, Array]:
-        """Return the state after one period, and the samples, see `advance`.
+        """Return the state after one period and the samples (see `advance`).
 
-        `change`, shape (ticks,), is added to the commands of the period. Raises NoOrbit if the block does not rock, at
-        the end of the period, about the corner about which it started.
+        `change`, shape (ticks,), is added to the commands of the period. Raises NoOrbit if the block does not end the
+        period rocking about the corner at which it started.
         """
         commands, y, mode = self.commands(drive), start.copy(), corner(start)
         if change is not None:

@@ -66,7 +66,7 @@ SOURCES: Mapping[str, Source] = {
     "decays with the spring": Source("A", "fit of the decays with the spring", _DECAYS),
     "bare frame": Source("A", "fit of the decays of the bare frame", _DECAYS),
 }
-"""Every contribution of the budgets, by name."""
+"""Source of every contribution to the budgets, by name."""
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from bench.analysis.signals import U1
 from sim.specimen import Specimen
 
 FALLEN_TILT = 0.25
-"""Tilt [rad] that no rocking block reaches: about twice the block's critical angle."""
+"""Tilt [rad] at which a block counts as fallen: twice the critical angle of the default block."""
 
 
 PERIODS = 2.0

@@ -26,8 +26,8 @@ ANGLES = (0.0, 0.015, 0.03, 0.05, 0.08, 0.12, 0.2, 0.3, 0.45, 0.6, 0.8, 1.1, 1.4
 """Angles psi of the multipliers [rad]."""
 
 CAUTION = 0.3
-"""Factor applied to the logarithm of the likelihood. It is below 1 because decays and small angles of nearly equal
-likelihood shift the mean by different amounts, and the grid contains only a few of them.
+"""Factor applied to the logarithm of the likelihood. It is below 1 because modes of nearly equal likelihood, with
+different moduli or small angles, shift the mean by different amounts, and the grid contains only a few of them.
 """
 
 FINER = 9

@@ -18,7 +18,7 @@ SPREAD = 5.0
 """Largest deviation of a cycle of a steady motion from the mean of its window, in units of the tolerance."""
 
 KIN_SHARE = 0.25
-"""Fraction of the other storey's motion relative to which a storey that hardly moves is assessed."""
+"""A storey that hardly moves is assessed relative to at least this fraction of the larger motion."""
 
 
 @dataclass(frozen=True)

@@ -95,7 +95,7 @@ COVERAGE = 2.0
 """Coverage factor k of every expanded uncertainty."""
 
 NORMAL = 1000.0
-"""Degrees of freedom from which Student's t distribution is replaced by the normal distribution."""
+"""Effective degrees of freedom from which they are not stated: Student's t distribution is practically normal."""
 
 
 @dataclass(frozen=True)

@@ -245,7 +245,7 @@ def _channels(configuration: BenchConfiguration) -> Iterator[str]:
         reach = (channel.range - abs(channel.zero)) / abs(channel.sensitivity)
         low, high = _REACH.get(channel.measures, (0.0, inf))
         if not low <= reach <= high:
-            scale = f"sensitivity = {channel.sensitivity:g} and range = {channel.range:g} V"
+            scale = f"sensitivity = {channel.sensitivity:g}, zero = {channel.zero:g} V and range = {channel.range:g} V"
             yield f"{item}: with {scale} its range is {reach:.3g} {channel.unit}; usual values: {low:g} to {high:g}"
         if channel.limit is not None and channel.limit < _LEAST_SHARE * reach:
             yield f"{item}: limit = {channel.limit:g} {channel.unit} is below 1 % of its range, {reach:.3g}"

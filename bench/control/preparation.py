@@ -66,15 +66,16 @@ more than this.
 class PreparedMotion:
     """A motion of the table with its derivation from a record.
 
-    `record` begins at `begin` [s] on the original record's clock; before that time the table is at rest. All
-    accelerations were multiplied by `factor`. `peak_before` and `peak` are the largest magnitudes of acceleration
-    [m/s2] of the original record and of the motion; `motion` has the table's velocity and displacement. `band` [Hz] is
-    None if the record was not filtered, `reach` and `fit` are None if no stroke was given; `steps` describes the
-    processing steps in order.
+    `record` begins at `begin` [s] on the clock of the record after similitude, whose time is `time_ratio` times that of
+    the original record; before that time the table is at rest. All accelerations were multiplied by `factor`.
+    `peak_before` and `peak` are the largest magnitudes of acceleration [m/s2] of the original record and of the motion;
+    `motion` has the table's velocity and displacement. `band` [Hz] is None if the record was not filtered, `reach` and
+    `fit` are None if no stroke was given; `steps` describes the processing steps in order.
     """
 
     record: SampledRecord
     begin: float
+    time_ratio: float
     band: tuple[float, float] | None
     factor: float
     peak_before: float
@@ -83,6 +84,11 @@ class PreparedMotion:
     reach: Reach | None
     fit: StrokeFit | None
     steps: tuple[str, ...]
+
+    @property
+    def begin_in_record(self) -> float:
+        """Time of the original record at which the motion begins [s]."""
+        return self.begin / self.time_ratio
 
     def target(self, sample_rate: float) -> Target:
         """The motion at `sample_rate` [1/s], for its replication on the table.
@@ -154,6 +160,7 @@ def prepare(
     return PreparedMotion(
         record=made,
         begin=begin,
+        time_ratio=length_ratio**0.5,
         band=band,
         factor=factor,
         peak_before=peak_before,

@@ -43,7 +43,7 @@ class Sine:
         return asked / abs(asked)
 
     def fundamentals(self, cycle: Cycle, turn: complex) -> tuple[complex, complex]:
-        """Shares of the fundamental in one cycle: those of the drive as played, and those of the table's
+        """Shares of the fundamental in one cycle: that of the drive as played, and that of the table's
         acceleration.
         """
         unit = self.amplitude * turn
@@ -171,7 +171,7 @@ class SineControl:
         return tuple(complex(share) for share in played + step)
 
     def _learn(self, response: SineResponse) -> None:
-        """Correct the gains by the response to the last step."""
+        """Update the gains from the response to the last step."""
         if self._before is None:
             return
         before, n = self._before, self._highest

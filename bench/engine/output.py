@@ -250,7 +250,7 @@ class Output:
                 self.machine.go(State.HALTED, ending.reason, ending.cause)
             except RockbenchError as error:
                 ending = ending.then(Ending.failed(error))
-        # report the original cause, not a follow-up error
+        # report the original cause, not a consequential one
         with suppress(RockbenchError):
             self._alignments.publish()
         return ending

@@ -165,7 +165,7 @@ def _from_rest(coupled: Specimen, omega: float, amplitude: float, request: Histo
 
 
 def _steady(orbit: Orbit, request: HistoryRequest) -> History:
-    """History over full periods, starting where the sine of the base is zero and rising."""
+    """History over full periods, from an upward zero crossing of the base's acceleration."""
     n, periods = request.samples_per_period, request.periods
     one = orbit.samples(n)[:, 1:]
     count = n * periods + 1

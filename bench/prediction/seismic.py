@@ -146,8 +146,8 @@ RECORD: Columns = {
 }
 
 BAND: Columns = {
-    "band_low_hz": (np.float64, "Hz", "lower end of the table's frequency band; absent without filter"),
-    "band_high_hz": (np.float64, "Hz", "upper end of the table's frequency band; absent without filter"),
+    "band_low_hz": (np.float64, "Hz", "lower end of the table's frequency band; absent if no filter is used"),
+    "band_high_hz": (np.float64, "Hz", "upper end of the table's frequency band; absent if no filter is used"),
 }
 
 GAINS: Columns = {
@@ -191,7 +191,7 @@ MOTIONS: Columns = {
     "peak_m_s2": (np.float64, "m/s2", "greatest acceleration of the motion"),
     "velocity_max_m_per_s": (np.float64, "m/s", "greatest velocity of the table"),
     "displacement_max_m": (np.float64, "m", "greatest displacement of the table"),
-    "begin_s": (np.float64, "s", "start of the motion on the record's time axis"),
+    "begin_s": (np.float64, "s", "start of the motion on the time axis of the record after similitude"),
     "duration_s": (np.float64, "s", "duration of the motion"),
     "steps": (np.str_, "", "processing steps, in order"),
 }

@@ -232,9 +232,9 @@ LIKELY = 0.95
 """Quantile of the demands of the drawn specimens that is taken as the likely demand."""
 
 UNKNOWN_SHAKER = {
-    "force": "the moving mass is unknown: set hardware.moving_mass and hardware.force_constant",
-    "current": "the force constant is unknown: set hardware.moving_mass and hardware.force_constant",
-    "heating": "the force constant is unknown: set hardware.moving_mass and hardware.force_constant",
+    "force": "the moving mass or the force constant is unknown: set hardware.moving_mass and hardware.force_constant",
+    "current": "the moving mass or the force constant is unknown: set hardware.moving_mass and hardware.force_constant",
+    "heating": "the moving mass or the force constant is unknown: set hardware.moving_mass and hardware.force_constant",
 }
 """Reasons why demands on the shaker are not predicted, by quantity."""
 

@@ -168,7 +168,7 @@ def beyond_limits(found: Sequence[Combination], configuration: BenchConfiguratio
     for each in found:
         bare = left.get((each.record, None))
         if bare is not None and each.beta is not None:
-            left.setdefault((each.record, each.beta), f"with the bare frame {bare}")
+            left.setdefault((each.record, each.beta), f"with the bare frame: {bare}")
     for record in dict.fromkeys(each.record for each in found):
         springs = [each.beta for each in found if each.record == record and each.beta is not None]
         if all((record, beta) in left for beta in springs):

@@ -188,7 +188,7 @@ class Shaking:
             "table_velocity_m_s": prepared.motion.peak_velocity,
             "table_displacement_m": prepared.motion.peak_displacement,
             "part_from_s": self.begin,
-            "begin_s": self.begin + prepared.begin,
+            "begin_s": self.begin + prepared.begin_in_record,
             "duration_s": self.target.duration,
             "steps": list(prepared.steps),
         }

@@ -271,7 +271,7 @@ def histories_parts(campaign: Campaign) -> list[Part]:
         parameters = validated(EarthquakeParameters, campaign.parameters)
         known = {shaking.name: shaking for shaking in _shakings(campaign, parameters)}
     except InvalidInput as refused:
-        return [Notice(f"Histories are not drawn because records are missing: {refused}.")]
+        return [Notice(f"Histories are not drawn because the records cannot be prepared: {refused}.")]
     every = max(round(STEP * record.sample_rate), 1)
     motions: list[MotionPicture] = []
     drifts: list[DriftPicture] = []
@@ -309,7 +309,7 @@ def histories_parts(campaign: Campaign) -> list[Part]:
 def _shakings(campaign: Campaign, parameters: EarthquakeParameters) -> tuple[Shaking, ...]:
     """Records of the campaign from the data file; an older file does not contain them, so they are read again.
 
-    Raises InvalidInput for missing records.
+    Raises InvalidInput for records that cannot be read or prepared.
     """
     assert campaign.configuration is not None
     return shakings(parameters, campaign.configuration, FileSources.stored(campaign.record.tables))

@@ -42,7 +42,7 @@ class FreeRockingParameters(Parameters):
 
 
 class RockingPoint(Parameters):
-    """Restitution and shape of the block, from its motion and from its dimensions."""
+    """Restitution, critical angle and frequency parameter of the block, from its motion and from its dimensions."""
 
     part: str = quantity(..., "", "name of the tilt, or of all tilts")
     tilt_rad: float | None = quantity(None, "rad", "tilt before the release, positive towards the frame")

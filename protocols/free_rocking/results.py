@@ -238,7 +238,7 @@ def _shape_table(row: Mapping[str, Any]) -> Table:
     rows.append(
         [
             "r",
-            "change of r over all impact velocities",
+            "change of r over the range of impact velocities",
             with_uncertainty(row["trend"], row["trend_uncertainty"]),
             "0",
             "1",

@@ -4,5 +4,5 @@ from bench.live_view import GainCurve, LiveRun, LiveView
 
 
 def gain_view(_run: LiveRun) -> LiveView:
-    """Measured gains and predicted lines of alpha_2 over the frequency."""
+    """Measured points and predicted curves of alpha_2 against frequency."""
     return (GainCurve(),)

@@ -136,8 +136,8 @@ def _histories(campaign: Campaign, points: Sequence[Mapping[str, Any]]) -> list[
         parts += [
             Picture(
                 measured_figure(of_spring[first : first + ROWS]),
-                f"Measured cycles at β = {beta:g}: drift of the coupled and the bare frame (left), u₁ and the "
-                "predicted ϑ (right).",
+                f"Cycles at β = {beta:g}: measured and predicted drift of the coupled frame, and measured drift of the "
+                "bare frame (left); measured and predicted u₁, and predicted ϑ (right).",
                 "Curves of drift, first storey displacement and predicted rocking angle over three periods.",
             )
             for first in range(0, len(of_spring), ROWS)

@@ -5,7 +5,7 @@ from bench.live_view import LiveRun, LiveView, Panel, response_panel
 
 
 def response_view(run: LiveRun) -> LiveView:
-    """Magnitude of the response, and coherence, over the frequency."""
+    """Magnitude of the response, and coherence, against frequency."""
     found = run.events(TableIdentified)
     coherence = Panel(
         "coherence with the drive",

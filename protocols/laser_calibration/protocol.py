@@ -59,7 +59,8 @@ PROTOCOL = Protocol(
     details=(
         "The storeys are clamped to the table, which moves slowly over the range of the later tests. The result is "
         "the scale, the smooth linearity error and the delay of each laser, and the agreement between the lasers. "
-        "The key `laser_calibration` in the configuration of other runs names the result, laser_calibration.json. "
+        "To apply the result, laser_calibration.json, in other runs, set the key `laser_calibration` in their "
+        "configuration to its path. "
         "Without options, a run has eight passes of up to 50 mm and takes about four minutes."
     ),
     example="--config bench.toml",

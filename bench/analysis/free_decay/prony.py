@@ -4,9 +4,9 @@ Both lasers' signals obey one difference equation of fourth order, which is line
 
     y(n) = sum_k a_k y(n - k) + sum_k b_k x(n - k) + const
 
-The roots of 1 - sum a_k z^-k are the modes (Marple, Digital Spectral Analysis, 1987, ch. 11, and, for a system with an
-input, Ljung, System Identification, 2nd ed., sec. 7.3: ARX). Given the roots, the mode shapes also follow from a linear
-problem.
+The roots of 1 - sum a_k z^-k are the poles of the modes (Marple, Digital Spectral Analysis, 1987, ch. 11, and, for a
+system with an input, Ljung, System Identification, 2nd ed., sec. 7.3: ARX). Given the roots, the mode shapes also
+follow from a linear problem.
 """
 
 import numpy as np

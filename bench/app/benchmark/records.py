@@ -155,7 +155,7 @@ def records(quick: bool, members: int) -> Section:
         "difference in peak drift among those of the first five members that do not overturn.",
     )
     targets = (
-        Target("40 s record at rest", 0.3, 1e3 * rest.minimum, "ms"),
+        Target("40 s record, block at rest", 0.3, 1e3 * rest.minimum, "ms"),
         Target("40 s record, rocking throughout", 12.0, 1e3 * rock.minimum, "ms"),
         Target(f"scatter of 1 000 members (scaled from {members})", 10.0, many.minimum * 1000 / members, "s"),
     )

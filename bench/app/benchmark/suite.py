@@ -1,6 +1,6 @@
 # pyright: reportUnknownMemberType=false
-"""Runs the parts of the benchmark and writes the results: tables, JSON with a description of the machine,
-work-precision figure.
+"""Runs the parts of the benchmark and writes the results: tables, a JSON file that also describes the machine,
+and the work-precision figure.
 """
 
 import json

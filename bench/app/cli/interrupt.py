@@ -116,7 +116,7 @@ def interruptible(requests: "Requests", asking: Callable[[], bool]) -> Generator
 
 @contextmanager
 def leaving() -> Generator[None, None, None]:
-    """Context manager in which SIGINT ends the process at once, if `handle_signals` has installed a handler before."""
+    """Context manager in which SIGINT ends the process at once, provided that `handle_signals` was called."""
     before = signal.getsignal(signal.SIGINT)
     if not isinstance(before, Interrupts):
         yield
@@ -132,9 +132,9 @@ class Watch:
     """A thread that handles a signal when the main thread does not.
 
     Python calls a signal handler in the main thread, between two bytecode instructions: not while native code runs or
-    waits nor, on Windows before Python 3.14, during a wait for a lock. The number of the signal, however, is written at
-    once to a socket on which this thread waits. This thread ends the process only while the installed handler allows it
-    (`leavable`): never while a rig is open, and never under a handler of another program.
+    waits, nor, on Windows before Python 3.14, during a wait for a lock. The number of the signal, however, is written
+    at once to a socket on which this thread waits. This thread ends the process only while the installed handler allows
+    it (`leavable`): never while a rig is open, and never under a handler that other code has installed.
     """
 
     def __init__(self) -> None:

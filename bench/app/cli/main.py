@@ -86,7 +86,7 @@ COMMANDS = {
     ),
     "predict stability": (
         "predict:stability",
-        "Stability boundaries of the rocking motions in frequency, on fixed ground and on a table.",
+        "Frequencies of the stability boundaries of the rocking motions, on fixed ground and on a table.",
         "--beta 0.64 0.97 --plot stability.png",
     ),
     "predict attractor": (

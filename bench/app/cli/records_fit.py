@@ -111,7 +111,7 @@ def _content(fits: "StrokeFits") -> dict[str, Any]:
 def _text(fits: "StrokeFits") -> str:
     """The fits as text: preparation of the record, limits, a table with one row for each fit, and remarks."""
     motion_columns = (("peak", "m/s2"), ("velocity", "m/s"), ("stroke", "mm"), ("end", "mm"))
-    changes = [*(f"at {period:.3g} s" for period in fits.own), "rms", "most"]
+    changes = [*(f"at {period:.3g} s" for period in fits.own), "rms", "largest"]
     columns = [
         TextColumn("", words=True),
         *(TextColumn(title, unit) for title, unit in motion_columns),
@@ -132,7 +132,7 @@ def _text(fits: "StrokeFits") -> str:
             "",
             text_table(columns, rows),
             "",
-            "changes of the response spectrum: at the periods of the frame; rms and most from 0.1 to 2 s",
+            "changes in the response spectrum: at the periods of the frame, and rms and largest from 0.1 to 2 s",
             *(f"{method}: {motion.fit.done}" for method, motion in fits.fitted.items() if motion.fit is not None),
             *(f"{method}: {reason}" for method, reason in fits.refused.items()),
         ]
@@ -165,7 +165,7 @@ def _write_record(path: Path, fits: "StrokeFits") -> None:
         f"from: {record.name}, {record.source}, {record.format}",
         f"sha256 of the original: {record.sha256}",
         *motion.steps,
-        f"begins at {motion.begin:.9g} s of the original record; starts and ends at rest",
+        f"begins at {motion.begin_in_record:.9g} s of the original record; starts and ends at rest",
         f"acceleration in m/s2, dt = {motion.record.dt:.12g} s",
     ]
     rows = (f"{t:.12g},{a!r}\n" for t, a in zip(time.tolist(), motion.record.acceleration.tolist(), strict=True))
@@ -187,7 +187,7 @@ def _motion(motion: "PreparedMotion") -> dict[str, Any]:
         "final_velocity_m_s": float(motion.motion.velocity[-1]),
         "final_displacement_m": float(motion.motion.displacement[-1]),
         "factor": motion.factor,
-        "begin_s": motion.begin,
+        "begin_s": motion.begin_in_record,
         "dt_s": motion.record.dt,
         "duration_s": motion.record.duration,
         "steps": list(motion.steps),

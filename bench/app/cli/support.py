@@ -72,7 +72,7 @@ def bundle(
     """Collect a fault report: log, configuration, versions and latest data of a campaign in one archive.
 
     The data cover the last minute. If a part of the file cannot be read, the archive states the reason in its place.
-    The exit code is 0, or 2 if the archive is refused.
+    The exit code is 0, or 2 if the data file does not exist or the archive cannot be written.
     """
     progress("collecting the report")
     from bench.app.support.bundle import write_bundle

@@ -87,7 +87,8 @@ def gui(
         print_warning(line)
     # the window selects the first protocol: the campaign of the paper
     protocols = sorted(protocols, key=lambda each: each.name != "harmonic")
-    # Ctrl-C ends the process until the window installs its own handler: an exception would abort the import of PySide6
+    # until the window installs its own handler, Ctrl-C ends the process: Qt would abort it on an exception raised while
+    # PySide6 is imported
     with leaving():
         from bench.app.gui.window import open_window
 
@@ -113,7 +114,7 @@ def require_display() -> None:
             check=False,
         )
     except subprocess.TimeoutExpired:
-        why = f"{chosen} = {os.environ[chosen]!r} does not respond within {PATIENCE:g} s"
+        why = f"{chosen} = {os.environ[chosen]!r} did not respond within {PATIENCE:g} s"
         raise NoDisplay(chosen, why, "start it on a desktop or over `ssh -X`") from None
     if probe.returncode == 0:
         return

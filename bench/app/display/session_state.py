@@ -42,7 +42,7 @@ class SessionState:
         self.scene = RunDisplay()
         self.attached = attached
         self.run: Run | None = None
-        """The run; None until an attached session has sent its description."""
+        """The run; None before one has begun, and until an attached session has sent its description."""
         self.inputs: Mapping[str, bool] = {}
         self._inputs_received: float | None = None
         self.driven = False

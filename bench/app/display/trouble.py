@@ -48,7 +48,7 @@ _NOW_DISK = (
 NOW = {
     "request": "Clear STOP in the bar at the top when the bench is safe. A new run starts from the beginning.",
     "client_lost": (
-        "This window did not respond for some seconds. Close other programs, then start again. With the option "
+        "This window did not respond for several seconds. Close other programs, then start again. With the option "
         '"Continue without this window", a run continues in this case.'
     ),
     "declined": "Complete the task, or remove it from the plan, then start again.",

@@ -42,7 +42,7 @@ class StopButton(QPushButton):
         self.pressed.connect(controller.press_stop)
 
     def holds(self, place: QPoint) -> bool:
-        """Whether a point of the screen is on the visible part of the button."""
+        """Whether a point of the screen is within the button, covered or not, while it is shown."""
         return self.isVisible() and self.rect().contains(self.mapFromGlobal(place))
 
 

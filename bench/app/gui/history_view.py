@@ -124,7 +124,7 @@ class HistoryView(QWidget):
         self.show_whole()
 
     def compare(self, files: Sequence[RunFile]) -> None:
-        """Allow the same channels of `files`, the ticked ones, to be drawn as well."""
+        """Offer to draw the same channels of the ticked `files` as well."""
         self._others = files
         self.overlay.setEnabled(len(files) > 1)
         if self.overlay.isChecked():

@@ -112,7 +112,7 @@ class RunModel(QAbstractTableModel):
         self.arrange()
 
     def compare(self, compared: Sequence[Path]) -> None:
-        """Mark the compared runs, of which the first is the reference, by their paths in the list."""
+        """Mark the compared runs, given by their paths; the first is the reference."""
         self._compared, self._reference = frozenset(compared), compared[0] if compared else None
         self._repaint()
 

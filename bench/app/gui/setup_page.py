@@ -62,7 +62,7 @@ class DevicesPanel(QWidget):
         self.found.clear()
 
     def look(self) -> None:
-        """Start the search, which takes some seconds."""
+        """Start the search, which takes a few seconds."""
         if self._command is not None or not self.ask.isEnabled():
             return
         self._command = Command(["devices", *(["--config", str(self._path)] if self._path else [])], self)

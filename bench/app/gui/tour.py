@@ -57,7 +57,7 @@ class Tour(QFrame):
         self._show()
 
     def guide(self, places: Sequence[Place]) -> None:
-        """Set the locations of the steps, in order, and frame their controls."""
+        """Set the locations of the steps, in order, and frame the control of the current one."""
         self._places = tuple(places)
         self._show()
 

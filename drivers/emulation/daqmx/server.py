@@ -135,7 +135,7 @@ class NiDaqmx(
 
 
 class SessionUtilities(SessionUtilitiesServicer):
-    """Calls EnumerateDevices and ResetServer."""
+    """Implementation of EnumerateDevices and ResetServer."""
 
     def __init__(self, driver: Driver) -> None:
         self._driver = driver

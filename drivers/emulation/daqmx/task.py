@@ -10,7 +10,7 @@ from drivers.emulation.daqmx.errors import DaqmxFailure
 
 
 class Job(Protocol):
-    """The function of a task: its channels, timing and run."""
+    """Work of a task: its channels, its timing, and its start, stop and state."""
 
     @property
     def channels(self) -> tuple[str, ...]:

@@ -104,6 +104,14 @@ def test_time_goes_with_the_root_of_the_length_and_gravity_stays() -> None:
     assert fast.motion.peak_velocity == pytest.approx(slow.motion.peak_velocity / 2.0, rel=1e-2)
 
 
+def test_a_motion_in_model_time_states_where_it_begins_in_the_original_record() -> None:
+    original = record()
+    prepared = prepare(original, band=None, peak=None, trim=0.1, length_ratio=0.25)
+    first, middle = round(prepared.begin_in_record / original.dt), prepared.record.acceleration.size // 2
+    assert first > 0
+    assert prepared.record.acceleration[middle] == pytest.approx(original.acceleration[first + middle], rel=1e-12)
+
+
 @pytest.mark.parametrize("method", list(Method))
 def test_the_stroke_is_fitted_after_the_scaling(method: Method) -> None:
     reach = Reach.of(BenchConfiguration())

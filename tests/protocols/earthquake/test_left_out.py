@@ -36,7 +36,7 @@ def test_only_the_combination_beyond_a_limit_is_left_out() -> None:
 def test_a_record_beyond_a_limit_with_the_bare_frame_is_left_out_with_every_spring() -> None:
     found = left(("a", None, 2 * DRIFT), ("a", 0.25, 0.01), ("b", None, 0.01), ("b", 0.25, 0.01))
     assert found.keys() == {("a", None), ("a", 0.25)}
-    assert found["a", 0.25].startswith("with the bare frame drift")
+    assert found["a", 0.25].startswith("with the bare frame: drift")
 
 
 def test_the_bare_frame_is_not_needed_for_a_record_without_a_spring() -> None:

@@ -72,7 +72,7 @@ def _named(channels: Sequence[N], request: _AboutChannel) -> N:
 
 
 class ChannelAttributeService(Service):
-    """Calls GetChanAttribute... and SetChanAttribute..."""
+    """Implementation of GetChanAttribute... and SetChanAttribute..."""
 
     def GetChanAttributeDoubleArray(
         self, request: pb.GetChanAttributeDoubleArrayRequest, context: object

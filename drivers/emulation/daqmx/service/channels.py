@@ -38,7 +38,7 @@ J = TypeVar("J", bound=Job)
 
 
 class ChannelService(Service):
-    """Calls CreateAIVoltageChan, CreateAOVoltageChan, CreateDIChan, CreateDOChan and CreateCOPulseChanTime."""
+    """Implementation of Create... for the channels AIVoltage, AOVoltage, DI, DO and COPulseTime."""
 
     def CreateAIVoltageChan(
         self, request: pb.CreateAIVoltageChanRequest, context: object

@@ -22,7 +22,7 @@ from drivers.emulation.daqmx.watchdog import Watchdog
 
 
 class TaskService(Service):
-    """Calls CreateTask, ClearTask, StartTask, StopTask, TaskControl, IsTaskDone and GetTaskAttribute..."""
+    """Implementation of CreateTask, ClearTask, StartTask, StopTask, TaskControl, IsTaskDone and GetTaskAttribute..."""
 
     def CreateTask(self, request: pb.CreateTaskRequest, context: object) -> pb.CreateTaskResponse:
         task, new = self.opened(request.session_name, request.initialization_behavior)
@@ -99,7 +99,7 @@ class TaskService(Service):
 
 
 class LineService(Service):
-    """Calls WriteDigitalLines and ReadDigitalLines, with one byte per line."""
+    """Implementation of WriteDigitalLines and ReadDigitalLines, with one byte per line."""
 
     def WriteDigitalLines(self, request: pb.WriteDigitalLinesRequest, context: object) -> pb.WriteDigitalLinesResponse:
         task = self._task(request)
@@ -153,7 +153,9 @@ _LEVELS = {Level.HIGH.value: True, Level.LOW.value: False}
 
 
 class WatchdogService(TaskService):
-    """Calls CreateWatchdogTimerTaskEx, CfgWatchdog...ExpirStates, ControlWatchdogTask, GetWatchdogAttribute..."""
+    """Implementation of CreateWatchdogTimerTaskEx, CfgWatchdog...ExpirStates, ControlWatchdogTask and
+    GetWatchdogAttribute...
+    """
 
     def CreateWatchdogTimerTaskEx(
         self, request: pb.CreateWatchdogTimerTaskExRequest, context: object

@@ -34,7 +34,7 @@ class _ReadRequest(AboutTask, Protocol):
 
 
 class ReadingService(Service):
-    """Calls ReadBinaryI16, ReadBinaryI32, ReadAnalogF64 and GetReadAttribute..."""
+    """Implementation of ReadBinaryI16, ReadBinaryI32, ReadAnalogF64 and GetReadAttribute..."""
 
     def ReadBinaryI16(self, request: pb.ReadBinaryI16Request, context: object) -> pb.ReadBinaryI16Response:
         job, counts, status = self._read(request)
@@ -138,7 +138,7 @@ def _packed(
 
 
 class WritingService(Service):
-    """Calls WriteAnalogF64, WriteAnalogScalarF64, GetWriteAttribute... and SetWriteAttribute..."""
+    """Implementation of WriteAnalogF64, WriteAnalogScalarF64, GetWriteAttribute... and SetWriteAttribute..."""
 
     def WriteAnalogF64(self, request: pb.WriteAnalogF64Request, context: object) -> pb.WriteAnalogF64Response:
         task = self._task(request)

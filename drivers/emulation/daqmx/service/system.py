@@ -88,7 +88,7 @@ _CHASSIS: Mapping[int, ProductCategory] = {
 
 
 class SystemService(Service):
-    """Calls GetSystemInfoAttribute..., GetDeviceAttribute..., GetPhysicalChanAttribute..., ResetDevice and
+    """Implementation of GetSystemInfoAttribute..., GetDeviceAttribute..., GetPhysicalChanAttribute..., ResetDevice and
     GetErrorString.
     """
 

@@ -33,8 +33,8 @@ def _conversion_rate(job: Sampled, device: str) -> float:
 
 
 class TimingService(Service):
-    """Calls CfgSampClkTiming, CfgImplicitTiming, CfgDigEdgeStartTrig and DisableStartTrig, and those for attributes of
-    timing, triggers and buffers.
+    """Implementation of CfgSampClkTiming, CfgImplicitTiming, CfgDigEdgeStartTrig and DisableStartTrig, and of the calls
+    for attributes of timing, triggers and buffers.
     """
 
     def CfgSampClkTiming(self, request: pb.CfgSampClkTimingRequest, context: object) -> pb.CfgSampClkTimingResponse:
