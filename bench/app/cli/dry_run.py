@@ -111,7 +111,7 @@ def _text(found: "Preflight") -> str:
     lines = [_margins(found.margins)] if found.margins else ["This protocol does not predict margins."]
     if found.margins:
         binding = found.margins[0]
-        lines += ["", f"Tightest: {binding.bound.name}, limited by {binding.bound.owner}."]
+        lines += ["", f"Tightest margin: {binding.bound.name}, limited by {binding.bound.owner}."]
     lines += [f"Warning: {warning}" for warning in found.warnings]
     chances = [(stage.name, stage.chance) for stage in found.forecast.stages if stage.chance is not None]
     if chances:
