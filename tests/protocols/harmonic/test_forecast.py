@@ -248,5 +248,5 @@ def test_a_dry_run_tells_everything_and_creates_nothing(
     assert len(content["starts"]) == 6
     assert content["duration_s"] > 60.0
     assert content["disk"]["needed_bytes"] > 1e6
-    for words in (content["plan_hash"], "Tightest: drift, limited by limits.drift", "table displacement", "97%"):
+    for words in (content["plan_hash"], "Tightest margin: drift, limited by limits.drift", "table displacement", "97%"):
         assert words in text
