@@ -12,7 +12,9 @@ from bench.unfinished import write_new
 from sim.errors import InvalidInput
 
 _NAME = re.compile(r"[^\W_](?:[\w ().,=+-]*[\w)+])?")
-"""Names that are valid file names on every system."""
+"""Names that are valid file names on every system, except the reserved ones."""
+_RESERVED = re.compile(r"(?:con|prn|aux|nul|(?:com|lpt)[1-9¹²³]) *(?:\..*)?", re.IGNORECASE)
+"""Names of devices on Windows, which it also opens under names with an extension."""
 _NUMBER = re.compile(r"[+-]?(?:0|[1-9]\d*)(?:\.\d+)?(?:[eE][+-]?\d+)?")
 _LONGEST = 60
 LAST = "last-values"
@@ -34,6 +36,11 @@ class Presets:
 
     def path(self, protocol: str, name: str) -> Path:
         """File of a preset. Raises InvalidInput for a name that is not a valid file name."""
+        if name.endswith((".", " ")):
+            raise InvalidInput("preset", name, "Windows removes a dot or space at the end of a name; omit it")
+        if _RESERVED.fullmatch(name):
+            allowed = f"Windows reserves this name for a device; choose another one, such as {f'preset {name}'!r}"
+            raise InvalidInput("preset", name, allowed)
         if not _NAME.fullmatch(name) or len(name) > _LONGEST:
             allowed = (
                 f"use up to {_LONGEST} letters, digits, spaces and ().,=+-_, begin with a letter or digit, and do not "

@@ -143,7 +143,7 @@ def choose(*, serves_itself: bool, yes: bool, ask: bool, terminal: bool) -> Oper
     if yes and ask:
         raise RockbenchError("--yes and --ask contradict each other: use only one of them")
     if yes:
-        return Unattended("unattended run (--yes)")
+        return Unattended("unattended run, --yes")
     if ask:
         return AtTheConsole()
     if serves_itself:

@@ -137,7 +137,11 @@ NO_CHANGE = "< 0.01 %"
 SENSORS = ("table acceler.", "table displ.", "laser 1", "laser 2")
 STEADY_TIP = (
     "For each sensor, the mean cycles of two windows of {window} cycles are compared; steady means that they agree "
-    "within a third of {tolerance:g} % (settle tolerance). Computed from the traces; the run itself uses all samples."
+    "within a third of {tolerance:g} % (settle tolerance).\n"
+    "○ too few cycles, ◐ settling, ● steady, ◆ cycles that differ but repeat as a group; the number is the change "
+    "between the two windows.\n"
+    "Computed from the displayed traces, for information: the run ends a dwell by the same criterion, applied to the "
+    "samples of all sensors together."
 )
 LOST_PARTS, AND = ("{n} event(s)", "{n} block(s) of traces"), " and "
 LOST = "Not shown: {what}; the file contains all of them."

@@ -108,7 +108,7 @@ def _run(assignment: Run, host: SessionServer, requests: Requests) -> FromSessio
 
 def _policy(configuration: BenchConfiguration) -> str:
     """Recorded name of the operator for automatic answers."""
-    return "the bench itself" if configuration.serves_itself else "unattended run (chosen at the window)"
+    return "the bench itself" if configuration.serves_itself else "unattended run, chosen at the window"
 
 
 def _give_way() -> None:

@@ -14,7 +14,9 @@ from bench.app.cli.main import main
 from bench.app.cli.terminal import AtTheConsole, choose
 from bench.app.folders import check_folder
 from bench.config.model import BenchConfiguration
+from bench.datafile.opening import columns_from
 from bench.engine.interface import Requests, Unattended
+from bench.events import OperatorAnswered
 from drivers.rig import RigError
 from protocols.harmonic.protocol import HarmonicParameters
 from sim.errors import InvalidInput, RockbenchError
@@ -241,6 +243,10 @@ def test_who_answers():
     unattended = choose(serves_itself=False, yes=True, ask=False, terminal=False)
     assert unattended.confirm("Mount the spring.")
     assert "--yes" in unattended.name
+    # the journal has the name in brackets
+    line = OperatorAnswered("Mount the spring.", unattended.name, time=1.0).line
+    assert line == "Mount the spring. (answered by unattended run, --yes)"
+    assert columns_from("OperatorAnswered", line) == {"by": unattended.name}
     with pytest.raises(RockbenchError, match="use --yes"):
         choose(serves_itself=False, yes=False, ask=False, terminal=False)
 

@@ -176,6 +176,24 @@ def test_a_name_that_is_no_file_name_is_refused(tmp_path: Path, name: str) -> No
     assert not list(tmp_path.rglob("*"))
 
 
+@pytest.mark.parametrize("name", ["CON", "nul", "Aux", "prn", "COM1", "lpt9", "com¹", "con.x", "NUL .a", "Com7.b.c"])
+def test_a_device_of_windows_is_refused_as_a_name(tmp_path: Path, name: str) -> None:
+    with pytest.raises(InvalidInput) as refused:
+        Presets(tmp_path).save(load_protocol("harmonic"), name, {})
+    assert str(refused.value).startswith(f"preset = {name!r} is refused: Windows reserves this name for a device; ")
+    assert not list(tmp_path.rglob("*"))
+    # the remedy that the message gives, and names that only resemble a device
+    for good in (f"preset {name}", "console", "COM0", "com10", "LPT", "a.con"):
+        assert Presets(tmp_path).save(load_protocol("harmonic"), good, {}).is_file()
+
+
+@pytest.mark.parametrize("name", ["Monday.", "Monday ", "a. "])
+def test_a_name_that_windows_would_shorten_is_refused_with_the_remedy(tmp_path: Path, name: str) -> None:
+    with pytest.raises(InvalidInput, match=r"dot or space at the end of a name; omit it") as refused:
+        Presets(tmp_path).save(load_protocol("harmonic"), name, {})
+    assert repr(name) in str(refused.value)
+
+
 def test_a_damaged_file_is_reported_and_changes_nothing(qtbot: QtBot, tmp_path: Path) -> None:
     folder = tmp_path / "presets" / LAST
     folder.mkdir(parents=True)

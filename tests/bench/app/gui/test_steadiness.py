@@ -100,6 +100,9 @@ def test_mark_word_and_number_say_the_same(qtbot: QtBot) -> None:
     run = replace(order(Path("never")), parameters=HarmonicParameters(settle_tolerance=TOLERANCE))
     view.begin(run)
     assert view.isHidden()
+    tip = view.toolTip()
+    assert all(mark in tip for mark in MARKS.values())
+    assert tip.endswith("the run ends a dwell by the same criterion, applied to the samples of all sensors together.")
     view.point(OMEGA, 0.4)
     assert run.configuration.laser_reference == "ground"
     view.add(_blocks(4.5 * PERIOD, beside_table=True))
