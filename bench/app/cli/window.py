@@ -11,7 +11,7 @@ from cyclopts import Parameter
 
 from bench.app.catalogue import all_protocols
 from bench.app.cli.inputs import configuration_from
-from bench.app.cli.interrupt import leaving
+from bench.app.cli.interrupt import leave, leaving
 from bench.app.cli.options import Handed, Seed, SpecimenFile
 from bench.app.cli.output import print_warning
 from bench.progress import silent
@@ -90,9 +90,13 @@ def gui(
     # until the window installs its own handler, Ctrl-C ends the process: Qt would abort it on an exception raised while
     # PySide6 is imported
     with leaving():
+        from bench.app.gui.background import end_reading
         from bench.app.gui.window import open_window
 
-        return open_window(configuration, protocols, config, queue)
+        code = open_window(configuration, protocols, config, queue)
+    if not end_reading():
+        leave(code)
+    return code
 
 
 def require_display() -> None:

@@ -51,6 +51,14 @@ class Found:
 
 
 @dataclass(frozen=True)
+class Listing:
+    """The data files of a folder; `real` is its path without links."""
+
+    real: Path
+    found: tuple[Found, ...]
+
+
+@dataclass(frozen=True)
 class RunRow:
     """Texts of a run. `cells` has one text for each of `texts.RUN_TITLES` after the first, `tips` their tooltips,
     `began` is the start [s since 1970], `usable` is False for a file that cannot be opened, and `figure` is the picture
@@ -77,6 +85,11 @@ def find_runs(folder: Path) -> tuple[Found, ...]:
     found = list[Found]()
     _find(folder, DEPTH, found)
     return tuple(sorted(found, key=lambda each: each.changed, reverse=True))
+
+
+def list_runs(folder: Path) -> Listing:
+    """The data files as found by `find_runs`. Raises OSError if the folder cannot be read."""
+    return Listing(folder.resolve(), find_runs(folder))
 
 
 def _find(folder: Path, depth: int, found: list[Found]) -> None:

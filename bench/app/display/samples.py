@@ -49,6 +49,17 @@ class Stretch:
     end: float
 
 
+@dataclass(frozen=True)
+class Probe:
+    """Samples of `tracks` at `times` [s]: for each track one value per time, in the channel's unit; NaN outside the
+    run.
+    """
+
+    tracks: Sequence[Track]
+    times: tuple[float, float]
+    values: list[list[float]]
+
+
 @dataclass(frozen=True, eq=False)
 class Spectrum:
     """Amplitude spectrum of a track: frequencies [Hz] and amplitudes in the channel's unit, both of shape (n,)."""
@@ -86,6 +97,11 @@ def read_values(tracks: Sequence[Track], times: Sequence[float]) -> list[list[fl
             ]
         )
     return found
+
+
+def probe(tracks: Sequence[Track], times: tuple[float, float]) -> Probe:
+    """The samples of the tracks at two cursors. Raises like `read_values`."""
+    return Probe(tracks, times, read_values(tracks, times))
 
 
 def read_spectra(tracks: Sequence[Track], begin: float, end: float) -> list[Spectrum]:

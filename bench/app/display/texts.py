@@ -162,7 +162,7 @@ FACTOR = "magnification"
 FACTOR_TIP = "Magnification of the motion; also with the mouse wheel, or the keys + and −, on the picture."
 
 OPEN, OPEN_TIP = "Open a file …", "Opens the data file (campaign.h5) of a run (Ctrl+O)."
-OPEN_BESIDE = "{why}; a path can be typed at any time"
+OPENING = "reading {path} …"
 FILE_SUMMARY = "{path}\n{start}, {status}: {summary} ({length} of samples)"
 RUN_FILES = "campaign (*.h5)"
 CONFIGURATION_FILES, SPECIMEN_FILES = "configuration (*.toml)", "specimen (*.json)"
@@ -170,7 +170,7 @@ REMOVE, REMOVE_TIP = "Close file", "Removes the selected file from this page; it
 PATH, FILES = "or type a path and press Enter", "open files"
 FILES_TIP = "The selected file is shown. Ticked files are drawn together; the first ticked file is the reference."
 GAINS, POINTS, COMPARISON, SAMPLES, FIGURE = "Points", "points", "Comparison", "Samples", "Figure"
-NO_FIGURE = "The run wrote no figure."
+NO_FIGURE, FIGURE_READING = "The run wrote no figure.", "reading the figures …"
 POINT_TITLES = ("point", "quantity", "measured ± U", "predicted ± U", "difference", "verdict")
 POINT_TIPS = (
     "point of the campaign",
@@ -247,7 +247,7 @@ RUNS_AGAINST_TIP = "Makes the selected run the reference of the comparison (Ctrl
 RUNS_FOLDER, RUNS_FOLDER_TIP = "Folder …", "Shows the runs in another folder and in the folders below it."
 RUNS_BACK, RUNS_BACK_TIP = "Opened run", "Returns to the opened run (Ctrl+B)."
 RUNS_ALL, RUNS_ALL_TIP = "All runs", "Shows the list of all runs (Ctrl+B)."
-RUNS_HELD = "A run is under way: open files from the list after its end."
+RUNS_HELD = "A run is under way: open files after its end; those that are already open can be shown."
 RUNS_COUNT = "{shown} of {all} files in {folder}"
 RUNS_REFERENCE = "reference: {name}, compared: {n}"
 RUNS_READING = "reading {n}"

@@ -1,4 +1,4 @@
-"""Background work: functions in a thread, commands in a separate process."""
+"""Background work: functions in a thread or in the reading process, commands in a separate process."""
 
 import shutil
 import subprocess
@@ -6,17 +6,26 @@ import sys
 import tempfile
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from functools import partial
 from threading import Lock, Thread
+from time import monotonic
 from typing import IO
+from weakref import WeakSet
 
 from PySide6.QtCore import QObject, QTimer, Signal
 
+from bench.app.reading_process import ReadingProcess
 from sim.errors import RockbenchError
 
 LOOK = 100
 """Interval between checks of a process [ms]."""
 BELOW_NORMAL = 0x4000
 """BELOW_NORMAL_PRIORITY_CLASS (Windows)."""
+ENDING = 0.5
+"""Longest wait for the threads of the readers when the program ends [s]."""
+
+_files = ReadingProcess()
+_threads = WeakSet[Thread]()
 
 
 class Reader(QObject):
@@ -32,11 +41,16 @@ class Reader(QObject):
 
     def __init__(self, parent: QObject) -> None:
         super().__init__(parent)
-        self._latest = 0
+        self._latest = self._told = 0
         self._lock = Lock()
         self._waiting: tuple[int, Callable[[], object]] | None = None
         self._busy = False
         self._done.connect(self._tell)
+
+    @property
+    def busy(self) -> bool:
+        """Whether the result of the last call has not been emitted yet."""
+        return self._told < self._latest
 
     def call(self, function: Callable[[], object]) -> None:
         """Schedule a call of `function`; earlier calls that have not started are dropped."""
@@ -47,7 +61,9 @@ class Reader(QObject):
                 return
             self._busy = True
         # no QThreadPool: its deletion waits for its threads, for ever if the window's thread holds Python's GIL
-        Thread(target=self._work, daemon=True).start()
+        thread = Thread(target=self._work, daemon=True)
+        _threads.add(thread)
+        thread.start()
 
     def _work(self) -> None:
         while True:
@@ -68,9 +84,36 @@ class Reader(QObject):
 
     def _tell(self, number: int, answer: object) -> None:
         if number == self._latest:
+            self._told = number
             self.found.emit(answer)
         if isinstance(answer, Exception) and not isinstance(answer, RockbenchError | OSError):
             raise answer
+
+
+class FileReader(Reader):
+    """A `Reader` that calls its functions in the reading process, which all share: for HDF5, which stops every thread
+    of its process while a disk stalls. Functions and results are pickled.
+    """
+
+    def call(self, function: Callable[[], object]) -> None:
+        """Schedule a call as `Reader.call` does."""
+        super().call(partial(_files.call, function))
+
+
+def start_reading() -> None:
+    """Start the reading process, which files will soon need."""
+    _files.start()
+
+
+def end_reading() -> bool:
+    """End the reading process; returns whether all threads of readers have ended. The disk may block one: it would
+    also block a normal end of this process, in which HDF5 closes its files.
+    """
+    _files.end()
+    end = monotonic() + ENDING
+    for thread in list(_threads):
+        thread.join(max(0.0, end - monotonic()))
+    return not any(thread.is_alive() for thread in _threads)
 
 
 class Command(QObject):

@@ -19,12 +19,12 @@ from PySide6.QtWidgets import (
 )
 
 from bench.app.display import texts
-from bench.app.display.samples import DRIVE, Spectrum, Stretch, Track, read_spectra, read_stretches, read_values
+from bench.app.display.run_file import RunFile
+from bench.app.display.samples import DRIVE, Probe, Spectrum, Stretch, Track, probe, read_spectra, read_stretches
 from bench.app.display.theme import Theme
 from bench.app.display.typography import in_screen_unit, label
 from bench.app.formatting import number
-from bench.app.gui.background import Reader
-from bench.app.gui.open_files import RunFile
+from bench.app.gui.background import FileReader
 from bench.app.gui.sample_plot import Line, SamplePlot
 from bench.app.gui.widgets import ElidingLabel
 
@@ -41,7 +41,7 @@ LEAST = 1e-12
 
 
 class HistoryView(QWidget):
-    """Plots of channels of a run, and of the same channels of the other ticked files. Threads read the files."""
+    """Plots of channels of a run, and of the same channels of the other ticked files, read by the reading process."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -55,7 +55,7 @@ class HistoryView(QWidget):
         self.whole, self.message, self.reading = QPushButton(texts.WHOLE), ElidingLabel(), ElidingLabel()
         self.plot = SamplePlot(theme, texts.SINCE_ARMED, "")
         self.spectrum = SamplePlot(theme, texts.SPECTRUM_AXIS, texts.AMPLITUDE, log=True)
-        self._readers = [Reader(self) for _ in range(3)]
+        self._readers = [FileReader(self) for _ in range(3)]
         self._wait, self._probe = (QTimer(self, interval=SETTLE, singleShot=True) for _ in range(2))
         self._arrange()
         for reader, take in zip(self._readers, (self._draw, self._draw_spectrum, self._read_out), strict=True):
@@ -195,15 +195,15 @@ class HistoryView(QWidget):
 
     def _read_cursors(self) -> None:
         if self.plot.cursors is not None and (tracks := self.tracks):
-            self._readers[2].call(partial(_probed, tracks, self.plot.cursors))
+            self._readers[2].call(partial(probe, tracks, self.plot.cursors))
 
     def _read_out(self, found: object) -> None:
         if self._failed(found) or self.plot.cursors is None:
             return
-        tracks, cursors, values = cast("tuple[list[Track], tuple[float, float], list[list[float]]]", found)
-        parts = [_times(*cursors)]
+        read = cast(Probe, found)
+        parts = [_times(*read.times)]
         units = dict[str, str]() if self._file is None else self._file.channels
-        for track, (first, second) in zip(tracks, values, strict=True):
+        for track, (first, second) in zip(read.tracks, read.values, strict=True):
             factor, unit = in_screen_unit(units.get(track.channel, ""))
             a, b = (number(factor * value) for value in (first, second))
             step = f"{factor * (second - first):+.4g}" if isfinite(second - first) else texts.NO_VALUE
@@ -247,12 +247,6 @@ class HistoryView(QWidget):
         column.addWidget(plots, 1)
         column.addWidget(self.reading)
         column.addWidget(self.message)
-
-
-def _probed(
-    tracks: list[Track], cursors: tuple[float, float]
-) -> tuple[list[Track], tuple[float, float], list[list[float]]]:
-    return tracks, cursors, read_values(tracks, cursors)
 
 
 def _times(first: float, second: float) -> str:

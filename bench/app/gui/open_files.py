@@ -1,11 +1,7 @@
-# pyright: reportUnknownMemberType=false, reportUnknownVariableType=false, reportUnknownArgumentType=false
-"""The open data files: their descriptions, and the list in which they are selected."""
+"""The list of the open data files, in which they are selected."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
 from enum import Enum, auto
 from pathlib import Path
-from typing import Any
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import (
@@ -13,68 +9,8 @@ from PySide6.QtWidgets import (
     QListWidgetItem,
 )
 
-from bench.app.catalogue import load_protocol
 from bench.app.display import texts
-from bench.app.display.gains import mark_of
-from bench.app.display.samples import DRIVE
-from bench.app.formatting import clock
-from bench.datafile.tables import Column, Table
-from bench.document.typography import moment
-from sim.errors import RockbenchError
-
-
-@dataclass(frozen=True, eq=False)
-class RunFile:
-    """Description of a file, its points and its prediction; `runs` maps the number of each run to its duration [s]."""
-
-    path: Path
-    headline: str
-    points: list[dict[str, Any]]
-    results: Mapping[str, Column]
-    prediction: Table
-    channels: Mapping[str, str]
-    """Unit of every channel by name, the drive last."""
-    runs: Mapping[int, float]
-    labels: Mapping[str, str] = field(default_factory=dict[str, str])
-    """Displayed names of fields of a point, as declared by the protocol."""
-
-    @property
-    def has_gains(self) -> bool:
-        """Whether any point has the fields of a gain."""
-        return any(mark_of(point) is not None for point in self.points)
-
-    @property
-    def name(self) -> str:
-        """Short name: the name of the folder, since the files of all runs have the same name."""
-        return self.path.resolve().parent.name or self.path.stem
-
-
-def read_file(path: Path) -> RunFile:
-    """Read the description of a file. Raises RockbenchError for a file that is unreadable or of another format."""
-    from bench.datafile.reader import open_datafile
-
-    with open_datafile(path) as record:
-        length = clock(record.rows / record.sample_rate)
-        return RunFile(
-            path,
-            texts.FILE_SUMMARY.format(
-                path=path, start=moment(record.start_time), status=record.status, summary=record.summary, length=length
-            ),
-            record.points,
-            record.results,
-            record.tables.get("prediction", {}),
-            {**{channel.name: channel.unit for channel in record.channels}, DRIVE: "V"},
-            {run.number: len(run.rows) / record.sample_rate for run in record.runs},
-            _labels(str(record.metadata.get("protocol", ""))),
-        )
-
-
-def _labels(protocol: str) -> Mapping[str, str]:
-    """Displayed names of the results of a protocol; empty for a protocol that is not installed."""
-    try:
-        return load_protocol(protocol).view.labels
-    except RockbenchError:
-        return {}
+from bench.app.display.run_file import RunFile
 
 
 class Place(Enum):
@@ -111,7 +47,7 @@ class FileList(QListWidget):
 
     def put(self, file: RunFile, place: Place = Place.TOO) -> None:
         """Add `file`, or replace the description of the same file that was read earlier."""
-        place_of = self._place(file.path)
+        place_of = next((row for row, each in enumerate(self._files) if each.real == file.real), None)
         row = len(self._files) if place_of is None else place_of
         self.blockSignals(True)
         if place_of is not None:
@@ -161,8 +97,10 @@ class FileList(QListWidget):
             self.ticked_changed.emit()
 
     def _place(self, path: Path) -> int | None:
-        wanted = path.resolve()
-        return next((row for row, each in enumerate(self._files) if each.path.resolve() == wanted), None)
+        # without the disk, which may stall: a link to an open file is found when it has been read
+        wanted = path.absolute()
+        found = (row for row, each in enumerate(self._files) if wanted in (each.path.absolute(), each.real))
+        return next(found, None)
 
     def remove_chosen(self) -> None:
         row = self.currentRow()

@@ -2,7 +2,9 @@
 overwritten.
 """
 
+from collections.abc import Sequence
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import QUrl
@@ -12,7 +14,7 @@ from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QPushButton, QSize
 from bench.app.catalogue import format_names
 from bench.app.display import texts
 from bench.app.export.format import load_format
-from bench.app.gui.background import Command
+from bench.app.gui.background import Command, Reader
 from bench.app.gui.widgets import set_level
 from sim.errors import InvalidInput
 
@@ -36,6 +38,9 @@ class Outputs(QWidget):
         self._file: Path | None = None
         self._made: Path | None = None
         self._command: Command | None = None
+        self._arguments: Sequence[str] = ()
+        self._reader = Reader(self)
+        self._reader.found.connect(self._run)
         self.form, self.format = QComboBox(), QComboBox()
         self.form.addItems(list(FORMS))
         self.form.setAccessibleName(texts.REPORT)
@@ -71,24 +76,34 @@ class Outputs(QWidget):
         if file is not None:
             command, flag = FORMS[self.form.currentText()]
             ending = flag.removeprefix("--")
-            self._run(free(file.with_suffix(f".report.{ending}")), command, str(file), flag)
+            self._make(file.with_suffix(f".report.{ending}"), command, str(file), flag)
 
     def _export(self) -> None:
         file = self._file
         if file is not None:
             to = str(self.format.currentData())
-            self._run(free(file.with_name(f"{file.stem}-{to}")), "export", str(file), "--to", to, "--out")
+            self._make(file.with_name(f"{file.stem}-{to}"), "export", str(file), "--to", to, "--out")
 
-    def _run(self, made: Path, *arguments: str) -> None:
-        self._made = made
-        self._command = Command([*arguments, str(made)], self)
-        self._command.over.connect(self._over)
-        self._say(texts.MAKING.format(path=made), "calm")
+    def _make(self, wanted: Path, *arguments: str) -> None:
+        """Start the command, with an unused name that a thread searches: the disk may stall."""
+        self._arguments = arguments
+        self._reader.call(partial(free, wanted))
+        self._say(texts.MAKING.format(path=wanted), "calm")
         self.open_made.hide()
         self._refresh()
 
+    def _run(self, made: object) -> None:
+        if isinstance(made, Path):
+            self._made = made
+            self._command = Command([*self._arguments, str(made)], self)
+            self._command.over.connect(self._over)
+            self._say(texts.MAKING.format(path=made), "calm")
+        else:
+            self._say(texts.NOT_MADE.format(text=made), "alarm")
+        self._refresh()
+
     def _over(self, code: int, text: str) -> None:
-        done = code == 0 and self._made is not None and self._made.exists()
+        done = code == 0
         self._say(
             texts.MADE.format(path=self._made) if done else texts.NOT_MADE.format(text=text),
             "calm" if done else "alarm",
@@ -109,4 +124,4 @@ class Outputs(QWidget):
 
     def _refresh(self) -> None:
         for button in (self.report, self.export):
-            button.setEnabled(self._file is not None and self._command is None)
+            button.setEnabled(self._file is not None and self._command is None and not self._reader.busy)

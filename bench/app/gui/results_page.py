@@ -2,11 +2,12 @@
 and export.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QDragEnterEvent, QDropEvent
+from PySide6.QtGui import QDragEnterEvent, QDropEvent, QShowEvent
 from PySide6.QtWidgets import (
     QCheckBox,
     QHBoxLayout,
@@ -23,13 +24,16 @@ from PySide6.QtWidgets import (
 from bench.app.display import texts
 from bench.app.display.gains import compare, kind_of
 from bench.app.display.point_table import rows_of, summary_of
+from bench.app.display.run_file import RunFile
 from bench.app.display.theme import Theme
 from bench.app.display.typography import typeset
+from bench.app.gui.background import start_reading
 from bench.app.gui.controller import Controller
 from bench.app.gui.figure_view import FigureView
+from bench.app.gui.file_opener import FileOpener
 from bench.app.gui.gain_plot import GainPlot
 from bench.app.gui.history_view import HistoryView
-from bench.app.gui.open_files import FileList, Place, read_file
+from bench.app.gui.open_files import FileList, Place
 from bench.app.gui.outputs import Outputs
 from bench.app.gui.result_tables import read_only, show_differences, show_points
 from bench.app.gui.run_browser import RunBrowser
@@ -39,7 +43,6 @@ from bench.app.gui.widgets import FITTING, ElidingLabel, ask_for_files, give_key
 from bench.app.ipc.messages import Ended, Refused
 from bench.datafile.tables import Column
 from bench.results import FILE
-from sim.errors import RockbenchError
 
 
 class ResultsPage(QWidget):
@@ -49,6 +52,9 @@ class ResultsPage(QWidget):
         super().__init__()
         self._controller = controller
         self.message, self.files = QLabel(texts.RESULTS_EMPTY, wordWrap=True), FileList()
+        self.reading, self.opener = ElidingLabel(), FileOpener(self)
+        self.reading.hide()
+        self.opener.changed.connect(self._show_reading)
         self.browser, self.views, self.view = RunBrowser(theme), QStackedWidget(), QWidget()
         self.all_runs = QPushButton(texts.RUNS_ALL)
         give_key(self.all_runs, "Ctrl+B")
@@ -123,27 +129,39 @@ class ResultsPage(QWidget):
         self.show_run()
         if isinstance(ended, Ended):
             compared = len(self.files.ticked) > 1
-            self.show_file(ended.out / FILE, place=Place.ASIDE if compared else Place.ALONE)
-            self._say(
-                texts.ENDED.format(status=ended.status, reason=ended.reason, out=ended.out),
-                "calm" if ended.status in ("completed", "stopped") else "alarm",
-            )
+            text = texts.ENDED.format(status=ended.status, reason=ended.reason, out=ended.out)
+            say = partial(self._say, text, "calm" if ended.status in ("completed", "stopped") else "alarm")
+            say()
+            # again, because the file that is shown states its own summary
+            self.show_file(ended.out / FILE, place=Place.ASIDE if compared else Place.ALONE, then=say, said=text)
         else:
             text = texts.FAILED if ended.failed else texts.REFUSED
             self._say(text.format(text=ended.text), "alarm")
 
-    def show_file(self, path: Path, *, place: Place = Place.TOO) -> bool:
-        """Open a data file, and return whether it was opened; a read error is reported and leaves the page
-        unchanged.
+    def show_file(
+        self, path: Path, *, place: Place = Place.TOO, then: Callable[[], None] | None = None, said: str = ""
+    ) -> None:
+        """Open a data file, or list the runs of a folder: the reading process reads it, and `then` is called when it
+        is shown. A read error is reported below the text `said`, and leaves the page unchanged.
         """
-        try:
-            file = read_file(path)
-        except (RockbenchError, OSError) as error:
-            self._say(str(error), "alarm")
-            self.browser.warn(str(error))
-            return False
-        self.files.put(file, place)
-        return True
+
+        def take(found: RunFile | Path | Exception) -> None:
+            if isinstance(found, Exception):
+                self._say("\n".join(filter(None, (said, str(found)))), "alarm")
+                self.browser.warn(str(found))
+            elif isinstance(found, Path):
+                self._use_folder(found)
+            else:
+                self.files.put(found, place)
+                if then is not None:
+                    then()
+
+        self.opener.open(path, take)
+
+    def showEvent(self, event: QShowEvent) -> None:
+        """Prepare the opening of files."""
+        super().showEvent(event)
+        start_reading()
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:
         """Accept data files."""
@@ -152,33 +170,46 @@ class ResultsPage(QWidget):
 
     def dropEvent(self, event: QDropEvent) -> None:
         """Open the dropped files."""
-        for url in event.mimeData().urls():
-            self._show_files([Path(url.toLocalFile())])
+        self._show_files([Path(url.toLocalFile()) for url in event.mimeData().urls()])
 
     def _open_run(self, path: Path) -> None:
         """Open a run from the list, and untick the others unless two or more are compared."""
-        if not self._held(path) and self.show_file(
-            path, place=Place.TOO if len(self.files.ticked) > 1 else Place.ALONE
-        ):
-            self.show_run()
+        if not self._held(path):
+            self.show_file(path, place=Place.TOO if len(self.files.ticked) > 1 else Place.ALONE, then=self.show_run)
 
     def _tick_run(self, path: Path, on: bool) -> None:
-        if self.files.holds(path) or (not self._held(path) and self.show_file(path, place=Place.ASIDE)):
-            self.files.tick(path, on=on)
+        self._when_open(path, lambda: self.files.tick(path, on=on))
 
     def _compare_against(self, path: Path) -> None:
-        if self.files.holds(path) or (not self._held(path) and self.show_file(path, place=Place.ASIDE)):
+        def refer() -> None:
             self.files.make_first(path)
             self.files.tick(path, on=True)
 
+        self._when_open(path, refer)
+
+    def _when_open(self, path: Path, then: Callable[[], None]) -> None:
+        if self.files.holds(path):
+            then()
+        elif not self._held(path):
+            self.show_file(path, place=Place.ASIDE, then=then)
+
     def _held(self, path: Path) -> bool:
-        """Whether the file must not be opened before the end of the run, because a window that waits for a slow disk
-        responds neither to the session nor to STOP.
+        """Whether the file must stay closed until the end of a run, for which the disk and the processors are kept
+        free; an open file is only read again.
         """
         held = self._controller.running and not self.files.holds(path)
         if held:
+            self._say(texts.RUNS_HELD, "alarm")
             self.browser.warn(texts.RUNS_HELD)
         return held
+
+    def _show_reading(self) -> None:
+        """Name the file that is being read."""
+        path = self.opener.current
+        text = "" if path is None else texts.OPENING.format(path=path)
+        self.reading.setText(text)
+        self.reading.setVisible(bool(text))
+        self.browser.show_opening(text)
 
     def _choose(self) -> None:
         file = self.files.chosen
@@ -209,7 +240,7 @@ class ResultsPage(QWidget):
     def _draw(self) -> None:
         """Draw the gains of all ticked files, with the predicted lines of the first."""
         files = self.files.ticked
-        self.browser.compare([file.path for file in files])
+        self.browser.compare([file.real for file in files])
         self.histories.compare(files)
         self.gains.predict(files[0].prediction if files else {})
         for run, file in enumerate(files):
@@ -228,8 +259,9 @@ class ResultsPage(QWidget):
         ask_for_files(self, self._controller, texts.OPEN, texts.RUN_FILES, self._show_files, folder="runs", many=True)
 
     def _show_files(self, paths: list[Path]) -> None:
-        if [path for path in paths if self.show_file(path)]:
-            self.show_run()
+        for path in paths:
+            if not self._held(path):
+                self.show_file(path, then=self.show_run)
 
     def _ask_folder(self) -> None:
         title = texts.RUNS_FOLDER
@@ -243,18 +275,15 @@ class ResultsPage(QWidget):
 
     def _open_typed(self) -> None:
         if self.path.text().strip():
-            path = FileList.path_of(self.path.text())
-            if path.is_dir():
-                self._use_folder(path)
-            else:
-                self._show_files([path])
+            self._show_files([FileList.path_of(self.path.text())])
 
     def _refresh(self) -> None:
         why = why_no_dialog(self._controller)
         self.open_file.setEnabled(not why)
-        self.open_file.setToolTip(texts.OPEN_BESIDE.format(why=why) if why else texts.OPEN_TIP)
+        self.open_file.setToolTip(why or texts.OPEN_TIP)
         self.browser.choose.setEnabled(not why)
-        self.browser.choose.setToolTip(texts.OPEN_BESIDE.format(why=why) if why else texts.RUNS_FOLDER_TIP)
+        self.browser.choose.setToolTip(why or texts.RUNS_FOLDER_TIP)
+        self.browser.held = self._controller.running
 
     def _arrange(self) -> None:
         beside = QWidget()
@@ -294,6 +323,7 @@ class ResultsPage(QWidget):
         rows.setContentsMargins(0, 0, 0, 0)
         rows.addWidget(self.verdict)
         rows.addWidget(self.message)
+        rows.addWidget(self.reading)
         rows.addWidget(whole, 1)
         rows.addWidget(self.reuse)
         rows.addWidget(self.outputs)

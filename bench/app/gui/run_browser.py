@@ -20,7 +20,7 @@ from PySide6.QtWidgets import (
 )
 
 from bench.app.display import texts
-from bench.app.display.run_list import Found, RunRow, find_runs, read_row
+from bench.app.display.run_list import Found, Listing, RunRow, list_runs, read_row
 from bench.app.display.theme import Theme
 from bench.app.gui.background import Reader
 from bench.app.gui.run_model import DATE, PICTURE, RunModel
@@ -75,13 +75,16 @@ class RunBrowser(QWidget):
     def __init__(self, theme: Theme, folder: Path = RUNS) -> None:
         super().__init__()
         self.folder = folder
+        self.held = False
+        """Whether a run is under way, during which the window must not wait for the disk."""
+        self._real = folder.absolute()
         self.model = RunModel(theme, self)
         self.search = QLineEdit(placeholderText=texts.RUNS_SEARCH, clearButtonEnabled=True)
         self.open, self.against = QPushButton(texts.RUNS_OPEN), QPushButton(texts.RUNS_AGAINST)
         self.choose, self.back = QPushButton(texts.RUNS_FOLDER), QPushButton(texts.RUNS_BACK)
         self.message, self.table = ElidingLabel(), _Table()
         self._unread = list[Found]()
-        self._problem, self._compared = "", list[Path]()
+        self._problem, self._opening, self._compared = "", "", list[Path]()
         self._current: Path | None = None
         self._reader, self._watch = Reader(self), QFileSystemWatcher(self)
         self._again = QTimer(self, interval=AGAIN)
@@ -112,29 +115,28 @@ class RunBrowser(QWidget):
 
     def use_folder(self, folder: Path) -> None:
         """List the runs of another folder."""
-        self.folder = folder
+        self.folder, self._real = folder, folder.absolute()
         self._mark()
         self.look()
 
     def look(self) -> None:
         """List the folder again, in the thread."""
-        followed, wanted = self._watch.directories(), str(self.folder.absolute())
-        if followed != [wanted]:
-            if followed:
-                self._watch.removePaths(followed)
-            if self.folder.is_dir():
-                self._watch.addPath(wanted)
-        self._reader.call(partial(find_runs, self.folder))
+        self._reader.call(partial(list_runs, self.folder))
 
     def compare(self, compared: Sequence[Path]) -> None:
-        """Mark the compared runs, of which the reference is the first."""
-        self._compared = [each.resolve() for each in compared]
+        """Mark the compared runs, of which the reference is the first; paths are without links."""
+        self._compared = list(compared)
         self._mark()
         self._say()
 
     def warn(self, problem: str) -> None:
         """Show a problem until the folder is listed again."""
         self._problem = f"▲ {problem}"
+        self._say()
+
+    def show_opening(self, text: str) -> None:
+        """Name the file that is being opened; an empty text ends it."""
+        self._opening = text
         self._say()
 
     def showEvent(self, event: QShowEvent) -> None:
@@ -145,17 +147,22 @@ class RunBrowser(QWidget):
         self._again.start()
 
     def hideEvent(self, event: QHideEvent) -> None:
-        """Stop the periodic listing."""
+        """Stop the periodic listing, and follow the folder no longer."""
         super().hideEvent(event)
         self._again.stop()
+        self._follow("")
 
     def _take(self, found: object) -> None:
         if isinstance(found, Exception):
             self._fail(found)
             return
         self._problem = ""
-        if isinstance(found, tuple):
-            self._unread = self.model.use(cast("tuple[Found, ...]", found))
+        if isinstance(found, Listing):
+            self._real = found.real
+            self._unread = self.model.use(found.found)
+            self._mark()
+            if self.isVisible():
+                self._follow(str(self.folder.absolute()))
         else:
             rows = cast("list[RunRow]", found)
             self.model.update(rows)
@@ -166,9 +173,18 @@ class RunBrowser(QWidget):
 
     def _mark(self) -> None:
         """Mark the compared runs by their paths in the list."""
-        real = self.folder.resolve()
-        inside = [(each, each.is_relative_to(real)) for each in self._compared]
-        self.model.compare([self.folder / path.relative_to(real) if own else path for path, own in inside])
+        inside = [(each, each.is_relative_to(self._real)) for each in self._compared]
+        self.model.compare([self.folder / path.relative_to(self._real) if own else path for path, own in inside])
+
+    def _follow(self, wanted: str) -> None:
+        """Be notified of changes of a folder that has just been listed, or of none; the listing follows the others."""
+        followed = self._watch.directories()
+        # Qt asks the disk when a folder is added
+        if followed != [wanted] and not (wanted and self.held):
+            if followed:
+                self._watch.removePaths(followed)
+            if wanted:
+                self._watch.addPath(wanted)
 
     def _fail(self, error: Exception) -> None:
         self._unread = self.model.use([])
@@ -190,7 +206,7 @@ class RunBrowser(QWidget):
         if self._unread:
             parts.append(texts.RUNS_READING.format(n=len(self._unread)))
         text = " · ".join(parts) if every else texts.RUNS_NONE.format(folder=folder)
-        self.message.setText(self._problem or text)
+        self.message.setText(self._problem or self._opening or text)
         set_level(self.message, "alarm" if self._problem.startswith("▲") else "calm")
         self._refresh()
 

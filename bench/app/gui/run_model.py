@@ -5,7 +5,16 @@ from functools import partial
 from pathlib import Path
 from typing import Any, cast
 
-from PySide6.QtCore import QAbstractTableModel, QModelIndex, QObject, QPersistentModelIndex, QSize, Qt, Signal
+from PySide6.QtCore import (
+    QAbstractTableModel,
+    QBuffer,
+    QModelIndex,
+    QObject,
+    QPersistentModelIndex,
+    QSize,
+    Qt,
+    Signal,
+)
 from PySide6.QtGui import QColor, QFont, QImage, QImageReader, QPainter, QPixmap
 
 from bench.app.display import texts
@@ -30,7 +39,13 @@ def load_pictures(wanted: Sequence[Picture], size: QSize) -> dict[Picture, QImag
 
 
 def _fitted(path: Path, size: QSize) -> QImage:
-    reader = QImageReader(str(path))
+    # read by Python, which lets the other threads continue while the disk stalls
+    data = QBuffer()
+    try:
+        data.setData(path.read_bytes())
+    except OSError:
+        return QImage()
+    reader = QImageReader(data)
     whole = reader.size()
     if not whole.isValid():
         return QImage()

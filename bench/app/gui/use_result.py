@@ -1,15 +1,18 @@
 """Row of controls with which the following runs use a result of the selected run."""
 
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
+from typing import cast
 
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QComboBox, QHBoxLayout, QPushButton, QWidget
 
 from bench.app.display import texts
+from bench.app.gui.background import Reader
 from bench.app.gui.controller import Controller
 from bench.app.gui.widgets import ElidingLabel, give_key, set_level, why_no_dialog
-from bench.app.result_use import results_in
+from bench.app.result_use import UsableResult, results_in
 
 
 class UseResult(QWidget):
@@ -26,6 +29,8 @@ class UseResult(QWidget):
         super().__init__()
         self._controller = controller
         self._used: Mapping[str, Path] = {}
+        self._reader = Reader(self)
+        self._reader.found.connect(self._offer)
         self.choice, self.message = QComboBox(), ElidingLabel()
         self.choice.setAccessibleName(texts.USE_CHOICE)
         self.use_it, self.back = QPushButton(texts.USE), QPushButton(texts.USE_BACK)
@@ -42,11 +47,9 @@ class UseResult(QWidget):
         self._refresh()
 
     def use(self, file: Path | None) -> None:
-        """Offer the results in the folder of this data file."""
-        self.choice.clear()
-        for result in [] if file is None else results_in(file.parent):
-            self.choice.addItem(texts.USE_ITEM.format(kind=result.kind, name=result.path.name), result)
-        self._refresh()
+        """Offer the results in the folder of this data file, which a thread lists."""
+        self._offer([])
+        self._reader.call(list if file is None else partial(results_in, file.parent))
 
     def show_used(self, used: Mapping[str, Path]) -> None:
         """Show the result files that the following runs use, by kind."""
@@ -58,6 +61,12 @@ class UseResult(QWidget):
     def show_refusal(self, text: str) -> None:
         """Show the reason why a result is not used."""
         self._say(f"▲ {text}", "alarm")
+        self._refresh()
+
+    def _offer(self, found: object) -> None:
+        self.choice.clear()
+        for result in cast("list[UsableResult]", found) if isinstance(found, list) else []:
+            self.choice.addItem(texts.USE_ITEM.format(kind=result.kind, name=result.path.name), result)
         self._refresh()
 
     def _want(self) -> None:

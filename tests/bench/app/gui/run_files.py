@@ -3,13 +3,19 @@
 from pathlib import Path
 
 import numpy as np
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QWidget
 
+from bench.app.gui.background import Reader
+from bench.app.gui.results_page import ResultsPage
 from bench.config.model import BenchConfiguration
 from bench.datafile.recorder import Recorder
 from bench.datafile.tables import Column
 from bench.events import Acquired, PointFinished
+from drivers.clock import now
 from drivers.rig import Block, Channel
 from protocols.harmonic.protocol import HarmonicPoint, PointStatus
+from tests.patience import LONG
 
 RATE, N = 1000.0, 4000
 CHANNELS = (
@@ -63,3 +69,18 @@ def begun(folder: Path, **about: str) -> tuple[Path, Recorder]:
             block = Block(first, counts(run)[first : first + 500])
             recorder(Acquired(run, block, np.full(500, 0.1 * run), time=first / RATE))
     return path, recorder
+
+
+def show(page: ResultsPage, *paths: Path) -> None:
+    """Open files on the page, and wait until they are shown."""
+    for path in paths:
+        page.show_file(path)
+    settle(page)
+
+
+def settle(shown: QWidget) -> None:
+    """Wait until everything that the page reads has been read."""
+    end = now() + LONG
+    while any(reader.busy for reader in shown.findChildren(Reader)):
+        assert now() < end
+        QTest.qWait(5)

@@ -28,6 +28,7 @@ from bench.events import Event
 from bench.live_values import Estimate
 from bench.results import FILE
 from protocols.harmonic.protocol import HarmonicParameters
+from tests.bench.app.gui.run_files import settle, show
 from tests.patience import LONG
 
 SIZE = (1280, 800)
@@ -109,10 +110,11 @@ def take(folder: Path) -> None:
         until(lambda: not controller.running)  # noqa: B023
         application.processEvents()
         window.pages.setCurrentWidget(window.results)
+        settle(window.results)
         picture("results")
         if len(ended) > 1:
             results = window.results
-            results.show_file(ended[0] / FILE)
+            show(results, ended[0] / FILE)
             results.parts.setCurrentWidget(results.differences)
             picture("compare")
             results.parts.setCurrentWidget(results.histories)

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from pytestqt.qtbot import QtBot
 
+from bench.app.display.run_file import RunFile, read_file
 from bench.app.display.samples import Track, read_spectra, read_stretches, read_values
 from bench.app.display.theme import DARK, LIGHT
 from bench.app.gui.history_view import HistoryView
-from bench.app.gui.open_files import RunFile, read_file
 from sim.errors import InvalidInput
 from tests.bench.app.gui.run_files import RATE, N, counts, made, point
 from tests.patience import LONG_MS

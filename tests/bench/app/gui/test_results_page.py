@@ -19,7 +19,7 @@ from bench.app.gui.outputs import free
 from bench.app.gui.results_page import ResultsPage
 from bench.app.ipc.messages import Ended
 from protocols.harmonic.protocol import PointStatus
-from tests.bench.app.gui.run_files import counts, made, point
+from tests.bench.app.gui.run_files import counts, made, point, settle, show
 from tests.patience import LONG_MS
 
 
@@ -62,7 +62,7 @@ def test_every_point_has_its_verdict_in_six_columns(page: ResultsPage, tmp_path:
     parts = '{"laser_scale": 0.001, "clock": 0.0005}'
     good = point(16.0, 0.2).model_copy(update={**told, "uncertainty_parts": parts})
     off = point(17.0, 0.3).model_copy(update={**told, "agrees": False, "status": PointStatus.MODULATED})
-    page.show_file(made(tmp_path / "wednesday", good, off, point(18.0, None)))
+    show(page, made(tmp_path / "wednesday", good, off, point(18.0, None)))
 
     def cells(row: int) -> list[str]:
         items = [page.table.item(row, column) for column in range(page.table.columnCount())]
@@ -88,13 +88,13 @@ def test_the_verdict_of_the_run_is_above_its_points(page: ResultsPage, tmp_path:
     told = {"alpha_2_predicted": 0.199, "alpha_2_predicted_uncertainty": 0.002, "agrees": True}
     good = point(16.0, 0.2).model_copy(update=told)
     off = point(17.0, 0.3).model_copy(update={**told, "agrees": False})
-    page.show_file(made(tmp_path / "one", good))
+    show(page, made(tmp_path / "one", good))
     assert page.verdict.text().startswith("α₂ 0.2000 ± 0.0040 · predicted 0.1990 ± 0.0020")
     assert "✓ agrees" in page.verdict.text()
-    page.show_file(made(tmp_path / "two", good, off, point(18.0, None)))
+    show(page, made(tmp_path / "two", good, off, point(18.0, None)))
     expected = "1 of 2 compared results agree with the prediction · ▲ DISAGREES: α₂ at ω = 17 rad/s, β = 0.4"
     assert page.verdict.text() == expected
-    page.show_file(made(tmp_path / "none", point(18.0, None)))
+    show(page, made(tmp_path / "none", point(18.0, None)))
     assert page.verdict.isHidden()
 
 
@@ -103,12 +103,13 @@ def test_a_file_has_the_figures_of_its_folder(page: ResultsPage, tmp_path: Path)
     image = QImage(200, 100, QImage.Format.Format_RGB32)
     image.fill(Qt.GlobalColor.red)
     image.save(str(path.with_name("gain_spectra.png")))
-    page.show_file(path)
+    show(page, path)
     page.parts.setCurrentWidget(page.figures)
     assert [page.figures.choice.itemText(row) for row in range(page.figures.choice.count())] == ["gain spectra"]
     shown = page.figures.picture.pixmap()
     assert shown.width() == pytest.approx(2 * shown.height(), abs=2)
     page.files.remove_chosen()
+    settle(page)
     assert page.figures.picture.text() == texts.NO_FIGURE
 
 
@@ -116,7 +117,7 @@ def test_the_normalised_errors_are_below_the_figure(page: ResultsPage, tmp_path:
     told = {"alpha_2_predicted": 0.199, "alpha_2_predicted_uncertainty": 0.003, "agrees": True}
     good = point(16.0, 0.2).model_copy(update=told)
     off = point(17.0, 0.189).model_copy(update={**told, "agrees": False})
-    page.show_file(made(tmp_path / "scored", point(15.0, 0.3), good, off, point(18.0, None)))
+    show(page, made(tmp_path / "scored", point(15.0, 0.3), good, off, point(18.0, None)))
     page.show_run()
     page.parts.setCurrentWidget(page.figures)
     strip = page.figures.scores
@@ -128,13 +129,13 @@ def test_the_normalised_errors_are_below_the_figure(page: ResultsPage, tmp_path:
     assert strip._item.viewRange()[1][0] < -2.0
     cells = [page.table.item(row - 1, 0).text() for row, _, _ in strip.scores]
     assert cells == ["ω = 16 rad/s, β = 0.4", "ω = 17 rad/s, β = 0.4"]
-    page.show_file(made(tmp_path / "alone", point(15.0, 0.3)))
+    show(page, made(tmp_path / "alone", point(15.0, 0.3)))
     assert strip.isHidden()
 
 
 def test_two_files_are_drawn_together_and_compared(page: ResultsPage, files: tuple[Path, Path]) -> None:
     for path in files:
-        page.show_file(path)
+        show(page, path)
     assert page.gains.measured == [(16.0, 0.2), (16.0, 0.212), (15.0, 0.31)]
     assert page.gains.bands == 1
     assert [file.name for file in page.files.ticked] == ["monday", "tuesday"]
@@ -143,6 +144,7 @@ def test_two_files_are_drawn_together_and_compared(page: ResultsPage, files: tup
     assert cells == ["tuesday", "ω = 16 rad/s, β = 0.4", "0.2000", "0.2120", "0.01200", "0.005000", "2.400", "▲ BEYOND"]
     assert page.differences.rowCount() == 3
     page.files.remove_chosen()
+    settle(page)
     assert page.gains.measured == [(16.0, 0.2)]
     assert page.differences.rowCount() == 0
     assert "monday" in page.message.text()
@@ -151,13 +153,15 @@ def test_two_files_are_drawn_together_and_compared(page: ResultsPage, files: tup
 def test_a_run_that_ends_takes_nobodys_comparison_away(
     page: ResultsPage, files: tuple[Path, Path], tmp_path: Path
 ) -> None:
-    page.show_file(files[0])
+    show(page, files[0])
     last = made(tmp_path / "wednesday", point(16.0, 0.22))
     page.show_end(Ended("completed", "the plan was carried out", {}, "", files[1].parent))
+    settle(page)
     assert [file.name for file in page.files.ticked] == ["tuesday"], "one file is no comparison"
     page.files.item(0).setCheckState(Qt.CheckState.Checked)
     chosen, before = page.files.chosen, page.gains.measured
     page.show_end(Ended("aborted", "abort requested", {}, "", last.parent))
+    settle(page)
     assert [file.name for file in page.files.ticked] == ["monday", "tuesday"]
     assert (page.files.chosen, page.gains.measured, page.files.count()) == (chosen, before, 3)
     assert "abort requested" in page.message.text()
@@ -168,9 +172,11 @@ def test_a_run_that_ends_takes_nobodys_comparison_away(
 def test_a_path_may_be_typed_and_a_wrong_one_changes_nothing(page: ResultsPage, files: tuple[Path, Path]) -> None:
     page.path.setText(f'"{files[0]}"')
     page.path.returnPressed.emit()
+    settle(page)
     assert page.files.count() == 1
     page.path.setText(str(files[0].with_name("none.h5")))
     page.path.returnPressed.emit()
+    settle(page)
     assert "there is no such file" in page.message.text()
     assert page.files.count() == 1
 
@@ -180,7 +186,7 @@ def test_export_and_report_are_those_of_the_command_line(
 ) -> None:
     folder = files[0].parent
     (folder / "campaign-mat").mkdir()
-    page.show_file(files[0])
+    show(page, files[0])
     outputs = page.outputs
     outputs.export.click()
     assert not outputs.export.isEnabled()
@@ -196,7 +202,7 @@ def test_export_and_report_are_those_of_the_command_line(
 
 
 def test_what_cannot_be_made_says_why(page: ResultsPage, files: tuple[Path, Path], qtbot: QtBot) -> None:
-    page.show_file(files[0])
+    show(page, files[0])
     page.outputs.use(files[0].with_name("none.h5"))
     page.outputs.report.click()
     qtbot.waitUntil(page.outputs.report.isEnabled, timeout=LONG_MS)

@@ -22,7 +22,7 @@ from bench.config.model import BenchConfiguration
 from bench.datafile.reader import open_datafile
 from bench.events import PointFinished
 from sim.specimen import Specimen
-from tests.bench.app.gui.run_files import begun, made, point
+from tests.bench.app.gui.run_files import begun, made, point, settle
 from tests.patience import LONG_MS
 
 AGREES = {"alpha_2_predicted": 0.199, "alpha_2_predicted_uncertainty": 0.002, "agrees": True}
@@ -107,6 +107,7 @@ def test_files_that_are_no_runs_are_rows_with_the_reason(page: ResultsPage, fold
     assert not browser.open.isEnabled()
     assert not browser.against.isEnabled()
     browser.table.entered_row.emit(browser.table.currentIndex())
+    settle(page)
     assert page.views.currentWidget() is browser
     assert browser.message.text().startswith("▲")
 
@@ -143,11 +144,13 @@ def test_a_run_is_opened_ticked_and_made_the_reference(page: ResultsPage, qtbot:
     first, second = (model.index(_names(browser).index(name), 0) for name in ("monday", "tuesday"))
     browser.table.setCurrentIndex(first)
     qtbot.keyClick(browser.table, Qt.Key.Key_Return)
+    settle(page)
     assert page.views.currentWidget() is page.view
     assert [file.name for file in page.files.ticked] == ["monday"]
     page.all_runs.click()
     assert page.views.currentWidget() is browser
     model.setData(second, Qt.CheckState.Checked.value, Qt.ItemDataRole.CheckStateRole)
+    settle(page)
     assert [file.name for file in page.files.ticked] == ["monday", "tuesday"]
     assert page.views.currentWidget() is browser, "ticking leaves the list open"
     browser.table.setCurrentIndex(second)
@@ -188,6 +191,7 @@ def test_one_key_leads_to_the_list_and_back(page: ResultsPage, qtbot: QtBot) -> 
     qtbot.keyClicks(page.browser.search, "meyer")
     assert _names(page.browser) == ["monday"]
     page._open_run(page.browser.model.shown[0])
+    settle(page)
     for view in (page.browser, page.view, page.browser):
         qtbot.keyClick(page, Qt.Key.Key_B, Qt.KeyboardModifier.ControlModifier)
         assert page.views.currentWidget() is view

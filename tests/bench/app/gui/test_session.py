@@ -9,6 +9,7 @@ from pytestqt.qtbot import QtBot
 
 from bench.app.gui.window import Window
 from bench.datafile.reader import open_datafile
+from tests.bench.app.gui.run_files import settle, show
 from tests.patience import LONG_MS
 
 
@@ -28,12 +29,13 @@ def test_from_the_form_to_the_file(window: Window, qtbot: QtBot, tmp_path: Path)
     qtbot.waitUntil(window.prompt.done.isEnabled, timeout=LONG_MS)
     qtbot.mouseClick(window.prompt.done, Qt.MouseButton.LeftButton)
     qtbot.waitUntil(lambda: window.pages.currentWidget() is window.results, timeout=LONG_MS)
+    settle(window.results)
     assert "Run completed" in window.results.message.text()
     assert window.results.table.rowCount() == 1
     assert len(window.run.traces.ring) > 100
     with open_datafile(tmp_path / "run" / "campaign.h5") as record:
         assert record.status == "completed"
     # what was shown stays when another file cannot be read
-    window.results.show_file(tmp_path / "nowhere.h5")
+    show(window.results, tmp_path / "nowhere.h5")
     assert "there is no such file" in window.results.message.text()
     assert window.results.table.rowCount() == 1

@@ -12,7 +12,7 @@ from bench.config.result_files import write_calibration, write_specimen
 from bench.control.table_model import TableModel
 from sim.identified import Finding, Identified
 from tests.bench.app.gui.conftest import ScriptedClient
-from tests.bench.app.gui.run_files import made, point
+from tests.bench.app.gui.run_files import made, point, settle
 from tests.bench.app.ipc.experiment import order
 
 pytestmark = pytest.mark.usefixtures("without_live_plots", "spoken")
@@ -55,6 +55,7 @@ def test_every_result_of_a_run_can_be_used_and_given_back(window: Window, run: P
     window.pages.setCurrentWidget(window.results)
     assert reuse.isHidden()
     window.results._open_run(run)
+    settle(window.results)
     kinds = [reuse.choice.itemText(k) for k in range(reuse.choice.count())]
     assert [each.partition(" (")[0] for each in kinds] == ["specimen", "table model", "laser calibration"]
     before = setup.configuration
@@ -82,6 +83,7 @@ def test_every_result_of_a_run_can_be_used_and_given_back(window: Window, run: P
 def test_an_unsuitable_result_is_refused_with_its_reason(window: Window, run: Path) -> None:
     reuse, setup = window.results.reuse, window.setup
     window.results._open_run(run)
+    settle(window.results)
     path = run.with_name("table_model.json")
     for model, why in (
         (_table_model(setup.configuration.sample_rate, NOW - timedelta(days=2)), "identif"),
@@ -104,6 +106,7 @@ def test_an_unsuitable_result_is_refused_with_its_reason(window: Window, run: Pa
 def test_nothing_is_changed_during_a_run(window: Window, run: Path) -> None:
     reuse, controller = window.results.reuse, window._controller
     window.results._open_run(run)
+    settle(window.results)
     controller.start(order(run.parent / "next"))
     assert not reuse.use_it.isEnabled()
     reuse._want()
@@ -113,4 +116,5 @@ def test_nothing_is_changed_during_a_run(window: Window, run: Path) -> None:
 
 def test_a_run_without_results_offers_none(window: Window, tmp_path: Path) -> None:
     window.results._open_run(made(tmp_path / "plain", point(16.0, 0.2)))
+    settle(window.results)
     assert window.results.reuse.isHidden()

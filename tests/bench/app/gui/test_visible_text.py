@@ -29,6 +29,7 @@ from bench.events import PointFinished
 from bench.protocol import Protocol
 from bench.replay.session import stored_configuration
 from tests.bench.app.gui.conftest import PROTOCOLS
+from tests.bench.app.gui.run_files import show
 from tests.bench.app.gui.visible_text import painted_texts, widget_texts
 from tests.first_edition.command import DATA, unpack
 from tests.test_visible_text import RUNS
@@ -117,7 +118,7 @@ def test_the_results_of_every_protocol(
     path = unpack(name, tmp_path / "monday").rename(tmp_path / "monday" / "campaign.h5")
     results = shown.results
     shown.pages.setCurrentWidget(results)
-    results.show_file(path)
+    show(results, path)
     for everything in (True, False):
         results.everything.setChecked(everything)
         for place in range(results.parts.count()):
