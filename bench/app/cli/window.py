@@ -90,8 +90,7 @@ def gui(
     # until the window installs its own handler, Ctrl-C ends the process: Qt would abort it on an exception raised while
     # PySide6 is imported
     with leaving():
-        from bench.app.gui.background import end_reading
-        from bench.app.gui.window import open_window
+        from bench.app.gui.window import end_reading, open_window
 
         code = open_window(configuration, protocols, config, queue)
     if not end_reading():

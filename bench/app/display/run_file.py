@@ -29,6 +29,8 @@ class RunFile:
     prediction: Table
     channels: Mapping[str, str]
     """Unit of every channel by name, the drive last."""
+    sample_rate: float
+    """Sample rate [1/s]."""
     runs: Mapping[int, float]
     labels: Mapping[str, str] = field(default_factory=dict[str, str])
     """Displayed names of fields of a point, as declared by the protocol."""
@@ -58,6 +60,7 @@ def read_file(path: Path) -> RunFile:
             record.results,
             record.tables.get("prediction", {}),
             {**{channel.name: channel.unit for channel in record.channels}, DRIVE: "V"},
+            record.sample_rate,
             {run.number: len(run.rows) / record.sample_rate for run in record.runs},
             _labels(str(record.metadata.get("protocol", ""))),
         )

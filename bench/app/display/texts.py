@@ -264,7 +264,13 @@ USE_BACK_TIP = "Uses the values of the configuration again for all following run
 USED = 'Runs now use {files}. "Configured values" undoes this.'
 FURTHER, FURTHER_TIP = "and …", "Adds channels: in the plot of the first channel or, for another unit, below it."
 OVERLAY, OVERLAY_TIP = "ticked runs", "Also draws the same channels and run of the other ticked files."
-CURSORS, CURSORS_TIP = "cursors", "Shows two movable cursors, A and B; the line below gives the samples at both."
+CURSORS = "cursors"
+CURSORS_TIP = (
+    "Shows two cursors, A and B, to drag; the line below gives the samples at both. While the plot has the focus, the "
+    "keys A and B select a cursor, ← and → move it by one sample, with Shift by ten, Home and End to the first and the "
+    "last visible sample."
+)
+PROBLEM = "{of}: {why}"
 SPECTRUM = "spectrum"
 SPECTRUM_TIP = (
     "Amplitude spectrum of all samples in the visible range (Hann window, mean removed): the line of a sine has the "

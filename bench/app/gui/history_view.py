@@ -48,6 +48,8 @@ class HistoryView(QWidget):
         self._file: RunFile | None = None
         self._others: Sequence[RunFile] = ()
         self.shown: list[Stretch] = []
+        self._problems = dict[str, str]()
+        """Errors by what they concern."""
         self.run, self.channel, self.further = QComboBox(), QComboBox(), QPushButton(texts.FURTHER)
         self._menu = QMenu(self)
         self.overlay = QCheckBox(texts.OVERLAY)
@@ -100,6 +102,8 @@ class HistoryView(QWidget):
     def use(self, file: RunFile | None) -> None:
         """Show the samples of this file, with the same channels as before, as far as the file contains them."""
         self._file = file
+        self._problems.clear()
+        self._show_problems()
         kept, checked = self.channel.currentData(), {each.data() for each in self._menu.actions() if each.isChecked()}
         for choice in (self.run, self.channel):
             choice.blockSignals(True)
@@ -134,6 +138,8 @@ class HistoryView(QWidget):
         """Show the whole run."""
         if self._file is not None and self.run.currentIndex() >= 0:
             length = list(self._file.runs.values())[self.run.currentIndex()]
+            rate = self._file.sample_rate
+            self.plot.samples = (1.0 / rate, max(round(length * rate) - 1, 0))
             self.plot.show_range(0.0, max(length, 1e-3))
             self._wait.stop()
             self.read()
@@ -153,14 +159,16 @@ class HistoryView(QWidget):
         self.read()
 
     def _show_cursors(self, on: bool) -> None:
+        self._report(texts.CURSORS, None)
         self.plot.show_cursors(on=on)
 
     def _show_spectrum(self, on: bool) -> None:
+        self._report(texts.SPECTRUM, None)
         self.spectrum.setVisible(on)
         self.read()
 
     def _draw(self, found: object) -> None:
-        if not self._failed(found):
+        if not self._report(texts.SAMPLES, found):
             self.shown = cast("list[Stretch]", found)
             lines = list[Line]()
             for each in self.shown:
@@ -169,7 +177,9 @@ class HistoryView(QWidget):
             self.plot.draw(lines)
 
     def _draw_spectrum(self, found: object) -> None:
-        if self._failed(found):
+        if not self.with_spectrum.isChecked():
+            return
+        if self._report(texts.SPECTRUM, found):
             self.spectrum.draw(())
             return
         lines = list[Line]()
@@ -180,11 +190,18 @@ class HistoryView(QWidget):
         if lines:
             self.spectrum.show_range(0.0, max(float(line.x[-1]) for line in lines))
 
-    def _failed(self, found: object) -> bool:
+    def _report(self, of: str, found: object) -> bool:
+        """Whether `found` is an error, which is shown until its subject `of` is read without one or is hidden."""
+        self._problems.pop(of, None)
         failed = isinstance(found, Exception)
-        self.message.setText(f"▲ {found}" if failed else "")
-        self.message.setVisible(failed)
+        if failed:
+            self._problems[of] = texts.PROBLEM.format(of=of, why=found)
+        self._show_problems()
         return failed
+
+    def _show_problems(self) -> None:
+        self.message.setText(f"▲ {' · '.join(self._problems.values())}")
+        self.message.setVisible(bool(self._problems))
 
     def _move_cursors(self) -> None:
         cursors = self.plot.cursors
@@ -198,7 +215,7 @@ class HistoryView(QWidget):
             self._readers[2].call(partial(probe, tracks, self.plot.cursors))
 
     def _read_out(self, found: object) -> None:
-        if self._failed(found) or self.plot.cursors is None:
+        if self.plot.cursors is None or self._report(texts.CURSORS, found):
             return
         read = cast(Probe, found)
         parts = [_times(*read.times)]

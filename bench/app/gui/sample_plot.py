@@ -4,13 +4,14 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import ceil, floor
 from typing import Any
 
 import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QColor
+from PySide6.QtGui import QColor, QKeyEvent
 
 from bench.app.display.theme import Theme
 from bench.app.gui.widgets import colour_axes
@@ -18,6 +19,13 @@ from bench.app.gui.widgets import colour_axes
 DASHES = (Qt.PenStyle.SolidLine, Qt.PenStyle.DashLine, Qt.PenStyle.DotLine)
 PLACES = (1.0 / 3.0, 2.0 / 3.0)
 """Initial positions of the cursors, relative to the visible range."""
+NAMES = ("A", "B")
+"""Names of the cursors, and the keys that select them."""
+STYLES = (Qt.PenStyle.SolidLine, Qt.PenStyle.DashLine)
+BOLD, PLAIN = 4, 2
+"""Line widths of the selected cursor and of the other one [px]."""
+FAST = 10
+"""Number of samples by which Shift with an arrow key moves a cursor."""
 WIDTH = 62
 """Width of the vertical axes [px], which aligns the plots."""
 ABREAST = 2
@@ -37,7 +45,9 @@ class Line:
 
 
 class SamplePlot(pg.GraphicsLayoutWidget):
-    """Lines over a common horizontal axis, in stacked plots, one for each unit; the wheel zooms, dragging pans."""
+    """Lines over a common horizontal axis, in stacked plots, one for each unit; the wheel zooms, dragging pans. Keys
+    select a cursor and move it from sample to sample.
+    """
 
     range_changed = Signal()
     cursors_moved = Signal()
@@ -53,6 +63,10 @@ class SamplePlot(pg.GraphicsLayoutWidget):
         self._pairs = list[tuple[Any, Any]]()
         self._cursors: tuple[float, float] | None = None
         self._moving = False
+        self.selected = 0
+        """Index of the cursor that the keys move."""
+        self.samples = (1.0, 0)
+        """Spacing of the samples on the horizontal axis, of which the first is at zero, and index of the last one."""
         self._layout: Any = self.ci
         self._lay_out([""])
 
@@ -107,6 +121,56 @@ class SamplePlot(pg.GraphicsLayoutWidget):
         self._place_cursors()
         self.cursors_moved.emit()
 
+    def keyPressEvent(self, ev: QKeyEvent) -> None:
+        """Select a cursor, or move the selected one."""
+        # arrow keys of some keyboards belong to the keypad
+        held = ev.modifiers() & ~Qt.KeyboardModifier.KeypadModifier
+        if self._cursors is None or held not in (Qt.KeyboardModifier.NoModifier, Qt.KeyboardModifier.ShiftModifier):
+            super().keyPressEvent(ev)
+            return
+        spacing, last = self.samples
+        begin, end = self.visible
+        at = round(self._cursors[self.selected] / spacing)
+        by = FAST if held == Qt.KeyboardModifier.ShiftModifier else 1
+        match ev.key():
+            case Qt.Key.Key_A | Qt.Key.Key_B:
+                self._select(ev.key() - Qt.Key.Key_A)
+                return
+            case Qt.Key.Key_Left:
+                at -= by
+            case Qt.Key.Key_Right:
+                at += by
+            case Qt.Key.Key_Home:
+                at = ceil(begin / spacing)
+            case Qt.Key.Key_End:
+                at = floor(end / spacing)
+            case _:
+                super().keyPressEvent(ev)
+                return
+        self._move(spacing * min(max(at, 0), last))
+
+    def _move(self, place: float) -> None:
+        """Move the selected cursor, and the visible range with it."""
+        if self._cursors is None:
+            return
+        first, second = self._cursors
+        self._cursors = (first, place) if self.selected else (place, second)
+        self._place_cursors()
+        begin, end = self.visible
+        if not begin <= place <= end:
+            self.show_range(place - 0.5 * (end - begin), place + 0.5 * (end - begin))
+        self.cursors_moved.emit()
+
+    def _select(self, cursor: int) -> None:
+        self.selected = cursor
+        for pair in self._pairs:
+            for number, each in enumerate(pair):
+                each.setPen(self._pen(number))
+
+    def _pen(self, cursor: int) -> Any:
+        width, style = BOLD if cursor == self.selected else PLAIN, STYLES[cursor]
+        return pg.mkPen(self._theme.wait, width=width, style=style)
+
     def _lay_out(self, units: Sequence[str]) -> None:
         kept = self.visible if self.plots else None
         self._layout.clear()
@@ -141,9 +205,8 @@ class SamplePlot(pg.GraphicsLayoutWidget):
 
     def _cursor_pair(self, plot: Any) -> tuple[Any, Any]:
         pair = []
-        for name, style in (("A", Qt.PenStyle.SolidLine), ("B", Qt.PenStyle.DashLine)):
-            pen = pg.mkPen(self._theme.wait, width=2, style=style)
-            cursor = pg.InfiniteLine(0.0, angle=90, movable=True, pen=pen, label=name)
+        for number, name in enumerate(NAMES):
+            cursor = pg.InfiniteLine(0.0, angle=90, movable=True, pen=self._pen(number), label=name)
             cursor.label.setColor(self._theme.text)
             cursor.label.setPosition(0.08)
             cursor.sigPositionChanged.connect(self._follow)
@@ -156,6 +219,7 @@ class SamplePlot(pg.GraphicsLayoutWidget):
         if self._moving or self._cursors is None:
             return
         pair = next(pair for pair in self._pairs if moved in pair)
+        self._select(pair.index(moved))
         self._cursors = (float(pair[0].value()), float(pair[1].value()))
         self._place_cursors()
         self.cursors_moved.emit()

@@ -26,6 +26,7 @@ from bench.app.display import texts
 from bench.app.display.theme import Theme
 from bench.app.display.trouble import Trouble
 from bench.app.gui.attach import SessionWatch
+from bench.app.gui.background import end_reading as end_reading
 from bench.app.gui.controller import Controller
 from bench.app.gui.header import Header, StopFilter
 from bench.app.gui.palette import chosen_theme, dress

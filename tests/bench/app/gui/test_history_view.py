@@ -4,6 +4,7 @@ from math import isnan
 
 import numpy as np
 import pytest
+from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
 
 from bench.app.display.run_file import RunFile, read_file
@@ -11,8 +12,9 @@ from bench.app.display.samples import Track, read_spectra, read_stretches, read_
 from bench.app.display.theme import DARK, LIGHT
 from bench.app.gui.history_view import HistoryView
 from sim.errors import InvalidInput
-from tests.bench.app.gui.run_files import RATE, N, counts, made, point
+from tests.bench.app.gui.run_files import RATE, N, counts, made, point, settle
 from tests.patience import LONG_MS
+from tests.read_functions import refused
 
 
 @pytest.fixture(scope="module")
@@ -108,6 +110,70 @@ def test_the_cursors_have_the_samples_of_the_file(view: HistoryView, qtbot: QtBo
     view.with_cursors.setChecked(False)
     assert view.reading.isHidden()
     assert view.plot.cursors is None
+
+
+def test_the_cursors_are_moved_by_keys(view: HistoryView, qtbot: QtBot) -> None:
+    view.channel.setCurrentText("laser 1")
+    for action in view._menu.actions():
+        if action.text() == "drive":
+            action.trigger()
+    _wait(view, qtbot, "laser 1", "drive")
+    view.with_cursors.setChecked(True)
+    view.plot.show_range(0.9996, 2.0004)
+    plot, none, shift = view.plot, Qt.KeyboardModifier.NoModifier, Qt.KeyboardModifier.ShiftModifier
+    moves = [
+        (Qt.Key.Key_Home, none, (1.0, None)),
+        (Qt.Key.Key_Right, none, (1.001, None)),
+        (Qt.Key.Key_Right, shift, (1.011, None)),
+        (Qt.Key.Key_Left, none, (1.010, None)),
+        (Qt.Key.Key_B, none, (1.010, None)),
+        (Qt.Key.Key_End, none, (1.010, 2.0)),
+        (Qt.Key.Key_Left, shift, (1.010, 1.99)),
+    ]
+    for key, held, (first, second) in moves:
+        qtbot.keyClick(plot, key, held)
+        assert plot.cursors == pytest.approx((first, second or plot.cursors[1]), abs=1e-9), key
+    assert [plot.selected, *(pair[1].value() for pair in plot._pairs)] == pytest.approx([1, 1.99, 1.99])
+    assert [cursor.pen.width() for cursor in plot._pairs[0]] == [2, 4], "the selected one is bold"
+    b = 1e-3 * counts(1)[1990, 1]
+    qtbot.waitUntil(lambda: f"B {b:#.4g}" in view.reading.text(), timeout=LONG_MS)
+    # to the ends of the run, and the visible range follows
+    for key, place in ((Qt.Key.Key_Right, (N - 1) / RATE), (Qt.Key.Key_Left, 0.0)):
+        for _ in range(N // 10 + 1):
+            qtbot.keyClick(plot, key, shift)
+        assert plot.cursors is not None
+        assert plot.cursors[1] == pytest.approx(place)
+        assert plot.visible[0] <= place <= plot.visible[1]
+    assert all(word in view.with_cursors.toolTip() for word in ("keys", "Shift", "Home"))
+
+
+def test_an_error_stays_until_its_subject_succeeds_or_is_hidden(
+    view: HistoryView, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def said(*subjects: str) -> bool:
+        shown = view.message.text() if view.message.isVisible() else ""
+        return all((f"{each}: " in shown) == (each in subjects) for each in ("Samples", "spectrum", "cursors"))
+
+    view.with_spectrum.setChecked(True)
+    view.plot.show_range(1.0, 1.01)
+    _wait(view, qtbot, "table acceleration", begin=1.0)
+    qtbot.waitUntil(lambda: said("spectrum"), timeout=LONG_MS)
+    assert "zoom out" in view.message.text()
+    view.with_cursors.setChecked(True)
+    qtbot.waitUntil(lambda: "B − A" in view.reading.text() and "table" in view.reading.text(), timeout=LONG_MS)
+    view.overlay.setChecked(True)
+    _wait(view, qtbot, "monday: table acceleration", "tuesday: table acceleration")
+    assert said("spectrum"), "samples and cursors were read without an error"
+    view.plot.show_range(1.0, 2.0)
+    qtbot.waitUntil(said, timeout=LONG_MS)
+    monkeypatch.setattr("bench.app.gui.history_view.probe", refused)
+    view.plot.cursors_moved.emit()
+    qtbot.waitUntil(lambda: said("cursors"), timeout=LONG_MS)
+    view.read()
+    settle(view)
+    assert said("cursors")
+    view.with_cursors.setChecked(False)
+    assert said()
 
 
 def test_values_outside_a_run_are_absent(files: tuple[RunFile, RunFile]) -> None:
