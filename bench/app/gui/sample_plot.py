@@ -65,7 +65,7 @@ class SamplePlot(pg.GraphicsLayoutWidget):
         self._moving = False
         self.selected = 0
         """Index of the cursor that the keys move."""
-        self.samples = (1.0, 0)
+        self.samples: tuple[float, int] = (1.0, 0)
         """Spacing of the samples on the horizontal axis, of which the first is at zero, and index of the last one."""
         self._layout: Any = self.ci
         self._lay_out([""])
