@@ -58,6 +58,8 @@ LISTED = {
     "bench/app/ipc/server.py self.broadcast.join": NOT_LONG,
     "bench/app/ipc/server.py self._host.answers.get": SHORT,
     "bench/app/ipc/server.py self._notes.get": NOT_LONG,
+    "bench/app/reading_process.py process.wait": SHORT,
+    "bench/app/reading_process.py self._lock.acquire": SHORT,
     "bench/app/support/doctor.py time.sleep": SHORT,
     "bench/app/support/doctor.py subprocess.run": CHILD,
     "bench/app/cli/closing.py threading.Event().wait": THREAD,

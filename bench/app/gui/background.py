@@ -21,7 +21,7 @@ LOOK = 100
 """Interval between checks of a process [ms]."""
 BELOW_NORMAL = 0x4000
 """BELOW_NORMAL_PRIORITY_CLASS (Windows)."""
-ENDING = 0.5
+ENDING = 0.2
 """Longest wait for the threads of the readers when the program ends [s]."""
 
 _files = ReadingProcess()
