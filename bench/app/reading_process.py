@@ -138,7 +138,9 @@ def _answer(request: bytes) -> bytes:
 
 
 def main() -> None:
-    """Answer calls until the standard input is closed."""
+    """Answer calls until the standard input is closed; a run has precedence on the processors."""
+    if sys.platform != "win32":
+        os.nice(10)
     # what most calls need
     import_module("bench.app.display.run_file")
     # whatever a library prints must not be taken for an answer

@@ -247,7 +247,6 @@ RUNS_AGAINST_TIP = "Makes the selected run the reference of the comparison (Ctrl
 RUNS_FOLDER, RUNS_FOLDER_TIP = "Folder …", "Shows the runs in another folder and in the folders below it."
 RUNS_BACK, RUNS_BACK_TIP = "Opened run", "Returns to the opened run (Ctrl+B)."
 RUNS_ALL, RUNS_ALL_TIP = "All runs", "Shows the list of all runs (Ctrl+B)."
-RUNS_HELD = "A run is under way: open files after its end; those that are already open can be shown."
 RUNS_COUNT = "{shown} of {all} files in {folder}"
 RUNS_REFERENCE = "reference: {name}, compared: {n}"
 RUNS_READING = "reading {n}"

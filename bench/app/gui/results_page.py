@@ -174,8 +174,7 @@ class ResultsPage(QWidget):
 
     def _open_run(self, path: Path) -> None:
         """Open a run from the list, and untick the others unless two or more are compared."""
-        if not self._held(path):
-            self.show_file(path, place=Place.TOO if len(self.files.ticked) > 1 else Place.ALONE, then=self.show_run)
+        self.show_file(path, place=Place.TOO if len(self.files.ticked) > 1 else Place.ALONE, then=self.show_run)
 
     def _tick_run(self, path: Path, on: bool) -> None:
         self._when_open(path, lambda: self.files.tick(path, on=on))
@@ -190,18 +189,8 @@ class ResultsPage(QWidget):
     def _when_open(self, path: Path, then: Callable[[], None]) -> None:
         if self.files.holds(path):
             then()
-        elif not self._held(path):
+        else:
             self.show_file(path, place=Place.ASIDE, then=then)
-
-    def _held(self, path: Path) -> bool:
-        """Whether the file must stay closed until the end of a run, for which the disk and the processors are kept
-        free; an open file is only read again.
-        """
-        held = self._controller.running and not self.files.holds(path)
-        if held:
-            self._say(texts.RUNS_HELD, "alarm")
-            self.browser.warn(texts.RUNS_HELD)
-        return held
 
     def _show_reading(self) -> None:
         """Name the file that is being read."""
@@ -260,8 +249,7 @@ class ResultsPage(QWidget):
 
     def _show_files(self, paths: list[Path]) -> None:
         for path in paths:
-            if not self._held(path):
-                self.show_file(path, then=self.show_run)
+            self.show_file(path, then=self.show_run)
 
     def _ask_folder(self) -> None:
         title = texts.RUNS_FOLDER
