@@ -1,4 +1,4 @@
-"""Errors of instruments. Whenever one is raised, the output is at zero or being set to zero."""
+"""Errors of instruments. When a rig raises one, its output is at zero or being set to zero."""
 
 from collections.abc import Sequence
 
@@ -6,7 +6,7 @@ from sim.errors import Cause, CauseCode, RockbenchError
 
 
 class RigError(RockbenchError):
-    """The rig could not carry out a command; its output is at zero or being set to zero.
+    """An instrument could not carry out a command.
 
     `code` is the error code of the instrument's own driver, if any.
     """

@@ -18,7 +18,8 @@ TAKEN = (
 
 
 class FurtherChannel(CalibratedInput):
-    """An additional analogue sensor, which is recorded, monitored, displayed and exported like every other channel.
+    """An additional analogue sensor, which is recorded, displayed and exported like every other channel, and monitored
+    if it has a limit.
 
     On hardware it is a DAQ input; on the simulated bench it measures the motion of `place`.
     """

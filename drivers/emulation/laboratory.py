@@ -25,7 +25,7 @@ LATE = 0.05
 
 @dataclass(frozen=True)
 class ClockErrors:
-    """Relative errors of the clocks: sample clock of the DAQ, lasers on the first and the second storey."""
+    """Relative errors of the DAQ's sample clock and of the clocks of the lasers on the first and second storeys."""
 
     daq: float = 12e-6
     laser_1: float = 30e-6
@@ -36,8 +36,8 @@ class Laboratory:
     """Emulated instruments with real wire protocols, connected to one virtual bench in real time.
 
     `hardware` is the configuration that a client requires; `modules` are the modules of a chassis. Raises InvalidInput
-    if the devices lack a required function, and DeviceNotFound if serial lasers are requested on a system without
-    pseudo-terminals; all instruments opened so far are closed first.
+    if `modules` are not valid for `device` or lack a required function, and DeviceNotFound if serial lasers are
+    requested on a system without pseudo-terminals; all instruments opened so far are closed first.
     """
 
     def __init__(
@@ -105,8 +105,8 @@ class Laboratory:
         self.daq.start()
 
     def late(self) -> dict[str, float]:
-        """Longest delay [s] with which this computer has sent values since the last call, by laser; only delays greater
-        than `LATE`.
+        """Longest delay [s] with which this computer has sent values since the last call, for each laser with a delay
+        greater than `LATE`.
         """
         found = {f"laser {storey}": laser.take_lateness() for storey, laser in enumerate(self.lasers, 1)}
         return {name: delay for name, delay in found.items() if delay > LATE}
@@ -136,8 +136,8 @@ class Laboratory:
         self.bench.perform(OperatorTask(arguments["work"]), arguments.get("amount"))
 
     def _switch_lasers(self, edges: NDArray[np.float64]) -> None:
-        """Switch the lasers at the edges of the counter, which is wired to their on/off inputs; a high level opens
-        these inputs, so that the lasers are off.
+        """Switch the lasers at `edges`, the host times [s] of the edges of the counter, whose output is wired to their
+        on/off inputs. A high level opens these inputs, which switches the lasers off.
         """
         for laser in self.lasers:
             laser.switch(edges)
@@ -156,8 +156,8 @@ class Laboratory:
         _FAULTS_OF_SAFETY[arguments["fault"]](self.safety, *arguments.get("arguments", ()))
 
     def _truth(self, arguments: Mapping[str, Any]) -> dict[str, Any]:  # noqa: ARG002 - the signature of a handler
-        """True values: host times [s] at which the clocks are zero, true clock rates, state of the enable chain, and
-        volts at the drive output.
+        """True values: host times [s] at which the clocks are zero, clock rates and time-stamp lags; states of the
+        enable chain and its contacts; volts at the drive output.
         """
         return {
             "enabled": self.bench.enabled,

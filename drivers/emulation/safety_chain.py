@@ -47,7 +47,8 @@ _ENDS: tuple[int, ...] = (1, 2)
 
 
 class SafetyChain:
-    """Controls the enable input of `bench`; the heartbeat relay opens `heartbeat` seconds after the last rising edge.
+    """Controls the enable input of `bench`; the heartbeat relay opens `heartbeat` [s] after the last rising edge of its
+    line.
 
     Contacts and faults may be read and set from any thread.
     """
@@ -83,8 +84,8 @@ class SafetyChain:
 
     @property
     def inputs(self) -> Mapping[str, Callable[[], bool]]:
-        """Functions that return the level of an input, by contact name: high while the contact is closed and its wire
-        intact.
+        """Function for each contact of `INPUTS` that returns the level of its input: high while the contact is closed
+        and the wire intact.
         """
         return {name: lambda name=name: self._level(name) for name in INPUTS}
 

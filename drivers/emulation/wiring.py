@@ -16,8 +16,8 @@ from sim.virtual_bench import VirtualBenchParameters
 Connection = Literal["serial", "socket", "analogue"]
 """Connection of the lasers; `socket` is the serial line through a TCP socket."""
 Device = Literal["usb", "crio", "cDAQ-9174", "cDAQ-9185", "cRIO-9045", "cRIO-9049", "PCIe-6351", "USB-6351"]
-"""Selectable devices: `usb` (USB-6363) and `crio` (cRIO-9045 with NI 9239), each with a calibration polynomial, and
-those of `zoo`.
+"""Selectable devices: `usb` (USB-6363) and `crio` (cRIO-9045 with NI 9239), both with calibration polynomials, and the
+devices of `zoo`.
 """
 
 _VALUES = 4
@@ -26,7 +26,7 @@ _BAUD = 921_600
 _WATCHDOG = 1.0
 """Time-out of the device's watchdog on the enable line [s]."""
 HEARTBEAT = 1.5
-"""Time-out of the heartbeat relay [s]; longer than that of the watchdog, so that the effects can be distinguished."""
+"""Time-out of the heartbeat relay [s]; longer than that of the watchdog, so that their effects can be distinguished."""
 _READY = 1.0
 """Configured delay of the amplifier: longest time from closing the enable line to the ready signal [s]."""
 _CONTACTS = 4
@@ -56,9 +56,9 @@ class Site:
 def site_of(device: Device, modules: Sequence[str] = ()) -> Site:
     """The wiring of a device, or of a chassis with `modules`.
 
-    With two input modules, the accelerometer is wired to the first and the other sensors to the second. Raises
-    InvalidInput for a chassis without inputs, output or relays, and if `modules` are specified for a fixed set of
-    devices.
+    If a chassis has several input modules, the accelerometer is wired to the first and the other sensors to the second.
+    Raises InvalidInput for a chassis without inputs, output or relays, for modules that it cannot hold, and if
+    `modules` are specified for a fixed set of devices.
     """
     if device in ("usb", "crio"):
         if modules:
@@ -114,10 +114,10 @@ def _contacts(devices: Sequence[DeviceModel], relays: DeviceModel) -> tuple[str,
 
 
 def sensors_within(parameters: VirtualBenchParameters, span: float) -> VirtualBenchParameters:
-    """The virtual bench with its sensors rescaled from the range of its converter to inputs of +-`span` [V].
+    """The virtual bench; if +-`span` [V] is less than its converter's range, its sensors are scaled down to this range.
 
-    The sensors of a laboratory, and the load resistors of its lasers, match its inputs. At the 5 V of an NI 9234,
-    sensors for 10 V would reach only half of their measuring ranges, and the limits of the bench would never trip.
+    The sensors of a laboratory, and the load resistors of its lasers, match its inputs. Inputs of 5 V (NI 9234) would
+    cut off the signals of 10 V sensors at half their measuring ranges.
     """
     share = min(1.0, span / parameters.converter.range)
     changed: dict[str, Parameters] = {}

@@ -53,8 +53,8 @@ def _same_address(server: str) -> str:
 
 @contextmanager
 def owned(devices: Iterable[str]) -> Generator[None]:
-    """Context manager that locks the `devices`. Raises DeviceNotFound naming the program that has locked one of
-    them.
+    """Context manager that locks the `devices`. Raises DeviceNotFound if another program has locked one of them, which
+    the message names, or if the lock cannot be created.
     """
     with ExitStack() as held:
         for device in devices:

@@ -106,8 +106,8 @@ class LaserInput(AnalogInput):
     serial_number: str | None = quantity(
         None,
         "",
-        "serial number of the sensor, to detect swapped ports; if absent, any sensor with this measuring "
-        "range is accepted",
+        "serial number of the sensor, to detect swapped ports; if absent, any sensor with the configured "
+        "measuring range is accepted",
         min_length=1,
         example="15030002",
     )
@@ -179,7 +179,7 @@ class Hardware(Parameters):
 
     @property
     def suspension(self) -> float:
-        """Stiffness between table and ground [N/m]; 0, because it is unknown."""
+        """Stiffness between table and ground [N/m]; always 0, since the configuration does not include it."""
         return 0.0
 
     @property

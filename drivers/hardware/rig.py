@@ -29,18 +29,14 @@ from drivers.timebase.marking import Pulses, golden_pulses
 _SETTLING = 0.05
 """Time between the last pulse and the first sample of a run [s]."""
 _CHUNK = 0.1
-"""Length of a read during the pulses [s], short compared with the time-outs of watchdog and heartbeat relay."""
+"""Longest read during the pulses [s]; short, because each read also serves the watchdog and the heartbeat relay."""
 _FIRST_READINGS = 20
-"""Number of readings of the sample clock after its start, which bound the clock to within a fraction of the duration of
-a reading.
-"""
+"""Number of readings of the sample clock directly after its start; the first block needs bounds at once."""
 
 _GOLDEN = 0.6180339887498949
-"""Phase step between consecutive readings [sample periods]; its multiples are evenly distributed over a period."""
+"""Phase step between consecutive readings [sample periods]; its multiples modulo 1 cover a period almost evenly."""
 _READINGS = 6
-"""Number of readings of the sample clock after each block; the best of several bounds the clock much more tightly than
-a single one.
-"""
+"""Number of readings of the sample clock after each block; several readings bound the clock more tightly than one."""
 
 
 class HardwareRig(RigBase):
@@ -49,8 +45,8 @@ class HardwareRig(RigBase):
     Samples are corrected for the delays of filters and multiplexers. A block can be returned only when its most delayed
     input is complete, so the largest delay is added to `lead`, the number of drive samples that must be queued beyond a
     block.
-    `further` are additional sensors. Raises InvalidInput or RigError if the bench differs from the configuration; all
-    devices are then closed.
+    `further` are additional sensors. Raises InvalidInput or RigError if a device is missing, in use or inconsistent
+    with the configuration; all devices are then closed.
     """
 
     def __init__(self, hardware: Hardware, *, lead: int, further: Sequence[FurtherChannel] = ()) -> None:
@@ -193,8 +189,9 @@ class HardwareRig(RigBase):
             )
 
     def _observe_clock(self, tracks: Tracks, times: int) -> None:
-        """Add readings of the sample clock, each bounded by readings of the machine's clock before and after it. If a
-        separate process supplies readings, these are used; otherwise the clock is read `times` times here.
+        """Add readings of the sample clock, each bounded by readings of the machine's clock before and after it. The
+        readings of the separate process are used, if there are any; otherwise the clock is read `times` times here,
+        unless that process has only just been started.
 
         The readings are spread over the sample period: if all were made right after a block, they would have the same
         phase, and the bounds would be no tighter than one period.
@@ -223,7 +220,9 @@ class HardwareRig(RigBase):
 
     @contextmanager
     def _ending_on_failure(self) -> Generator[None]:
-        """Context manager that cuts the output on any failure and raises the original error, not a follow-up one."""
+        """Context manager that cuts the output on any failure and raises the original error, not a consequential
+        one.
+        """
         try:
             yield
         except BaseException as error:

@@ -32,7 +32,7 @@ longest wait of a block that is already later [s], so that values received durin
 
 
 _FASTEST = 5.0
-"""Largest plausible speed of a target between two values [m/s]; the table reaches at most 1 m/s."""
+"""Largest plausible speed of a target between two values [m/s]; a faster change is marked as implausible."""
 MARKS = Marks(LOST, LATE, IMPLAUSIBLE)
 
 
@@ -183,7 +183,9 @@ class Tracks:
         self._opened.close()
 
     def _await(self, seconds: float, deadline: float) -> None:
-        """Wait for values up to a time of the sample clock [s], until `deadline` of the machine's clock."""
+        """Wait for values up to the time `seconds` of the sample clock [s], at most until the time `deadline` of the
+        machine's clock [s].
+        """
         self._take()
         for track in self._tracks:
             sensor = track.sensor

@@ -9,8 +9,8 @@ from drivers.errors import ConnectionLost, DeviceTimeout, RigError
 
 _WORD = re.compile(rb"[\x00-\x3f][\x40-\x7f][\x80-\xff]")
 _PROMPT = re.compile(rb"(?:^|(?<=[\r\n\x80-\xff]))->")
-"""Prompt, accepted only at the start of a line or after the rest of a truncated value, since elsewhere a minus sign in
-text or a value may resemble it.
+"""Prompt, accepted only at the start of a line or after the rest of a truncated value, since elsewhere the same two
+bytes may be part of text or of a value.
 """
 _NOT_TEXT = re.compile(rb"[^\t\r\n\x20-\x7e]")
 
@@ -98,7 +98,7 @@ class Dialogue:
     """Command dialogue with a sensor on `port`, whose read time-out is about 20 ms. `who` names sensor and port in
     errors.
 
-    Every method raises ConnectionLost if the port has disappeared.
+    Methods that use the port raise ConnectionLost if it has disappeared.
     """
 
     def __init__(self, who: str, port: Serial) -> None:
@@ -160,7 +160,7 @@ class Dialogue:
         return True
 
     def gone(self, error: Exception) -> ConnectionLost:
-        """The rig error for the failure `error` of the port."""
+        """The ConnectionLost for `error`, raised by the port."""
         return ConnectionLost(f"{self.who} was disconnected ({error}); plug it in, check its power, and reopen it")
 
     def _read(self) -> bytes:

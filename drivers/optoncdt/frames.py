@@ -207,7 +207,8 @@ class Assembler:
             expected = passed * (TICK * self._rate)
             turns = np.maximum(np.rint((expected - steps) / COUNTER_TURN), 0.0).astype(np.int64)
             steps = steps + turns * COUNTER_TURN
-            # over a long gap the clocks may differ by half a period of the counter: the number of wraps is ambiguous
+            # after a long gap the clocks may differ by half a period of the counter; the number of wraps is then
+            # ambiguous
             slack = 2.0 * _SLACK + _RATE_SLACK * expected
             jump = (np.abs(expected - steps) > slack) | (slack > COUNTER_TURN // 2)
         if jump.any():

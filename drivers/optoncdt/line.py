@@ -3,7 +3,7 @@
 A port buffers only a few thousand bytes, about a tenth of a second at the full rate. The process time-stamps the bytes
 on arrival and keeps them while this program is stalled, so that no values are lost.
 
-The process writes frames: time of arrival on the machine's clock [s] (float64), number of bytes (uint32), the bytes. A
+The process writes frames: arrival time on the machine's clock [s] (float64), number of bytes (uint32), and the bytes. A
 frame whose time is NaN contains the text of the error that ended the process; an empty frame reports that the port is
 open.
 """

@@ -53,7 +53,7 @@ def open_port(name: str, port: str, baud: int) -> Serial:
     """Open `port` with exclusive access, 8 data bits, no parity, one stop bit (manual, p. 84).
 
     `name` identifies the sensor in error messages. The baud rate and exclusive access do not apply to a network port.
-    Raises DeviceNotFound if the port is absent, held by another program, not permitted or not a serial port.
+    Raises DeviceNotFound if the port is absent, in use, not accessible to this account, or not a serial port.
     """
     if port.startswith(NETWORK):
         try:

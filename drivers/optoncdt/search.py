@@ -56,10 +56,10 @@ def info_in(lines: list[str]) -> SensorInfo | None:
 _PROBE = 0.3
 """Time-out of a command at one baud rate [s]."""
 _QUIET = 0.05
-"""Time without input after which the line counts as quiet [s]: adapters delay data by up to 16 ms."""
+"""Time without input after which the line counts as quiet [s]; adapters delay data by up to 16 ms."""
 _SILENCE = "OUTPUT NONE"
 _TRIES = 3
-"""Attempts per command: bytes sent earlier at wrong baud rates can corrupt the first command at the right one."""
+"""Attempts per command; bytes sent earlier at a wrong baud rate can corrupt the first command at the right one."""
 _DRAINED = 1.0
 """Longest wait for a quiet line [s]."""
 
@@ -113,7 +113,7 @@ def _answer(dialogue: Dialogue, baud: int, command: str, tries: int) -> Answer |
             refusal = _refusal(dialogue, command)
         except DeviceTimeout:
             continue
-        # noise may resemble a prompt, so only a name and a range are accepted as a reply
+        # noise may resemble a prompt, so only a reply that contains a name and a measuring range is accepted
         if (found := _identity(dialogue)) is not None:
             return Answer(baud, found, refusal)
     return None
@@ -161,7 +161,7 @@ def find_lasers(ports: Sequence[str] | None = None) -> list[FoundLaser]:
     """One search result per port of `ports`, by default of all ports that the system lists.
 
     Sends only queries, at each possible baud rate, so a sensor's settings do not change and a running stream continues.
-    The ports are searched in parallel, which takes about 4 s in total.
+    The ports are searched in parallel; a port at which no sensor responds takes about 4 s.
     """
     names = list(dict.fromkeys(listed_ports() if ports is None else ports))
     if not names:

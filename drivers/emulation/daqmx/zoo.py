@@ -1,4 +1,4 @@
-"""National Instruments devices by name, with specifications and rules from NI's documents.
+"""Models of National Instruments devices, with the specifications and rules given in NI's documents.
 
 Except where noted, the tables are taken from the documents alone, independently of the assumptions of this program's
 drivers.
@@ -18,7 +18,7 @@ _FILTER = 40.0 + 5.0 / 512.0
 
 _SINGLE_ENDED = Wirings.RSE | Wirings.NRSE | Wirings.DIFFERENTIAL
 _MODULE_MEMORY = 127
-"""Length of the output FIFO of a slot [samples], without regeneration (NI cDAQ-9174 Specifications, "Analog Output",
+"""Capacity of a slot's output FIFO without regeneration [samples] (NI cDAQ-9174 Specifications, "Analog Output",
 "AO FIFO").
 """
 
@@ -65,7 +65,8 @@ MODULES: dict[str, DeviceModel] = {
             delta_sigma=DeltaSigma(timebase=13.1072e6, samples=_FILTER, seconds=2.6e-6),
         ),
     ),
-    # NI 9239 Operating Instructions and Specifications: 24 bits, 12.8 MHz, input delay (40 + 5/512) / fs + 3.3 us
+    # NI 9239 Operating Instructions and Specifications: 24 bits, internal master timebase of 12.8 MHz, input delay
+    # (40 + 5/512) / fs + 3.3 us
     "9239": DeviceModel(
         "",
         "NI 9239",
@@ -95,7 +96,9 @@ _CDAQ_ENGINES = ("te0", "te1", "ai")
 """Timing engines for analogue inputs (NI-DAQmx help, "cDAQ-91xx and TestScale Chassis Timing Engines")."""
 _CRIO_INPUTS = tuple(f"it{k}" for k in range(8))
 _CRIO_OUTPUTS = tuple(f"ot{k}" for k in range(8))
-"""Timing engines of a DAQmx-enabled cRIO, one for each slot (NI knowledge base, kA03q000000x3FRCAY)."""
+"""Output timing engines of a DAQmx-enabled cRIO, which also has eight for inputs (NI knowledge base,
+kA03q000000x3FRCAY).
+"""
 _CDAQ = ProductCategory.COMPACT_DAQ_CHASSIS
 _CRIO = ProductCategory.COMPACT_RIO_CHASSIS
 _CHASSIS_WATCHDOG = (2.0**32 - 1.0) * 25.0e-9
@@ -107,7 +110,7 @@ def _cdaq(product: str, watchdog: float | None = None) -> DeviceModel:
 
 
 def _crio(product: str) -> DeviceModel:
-    """A controller, for which DAQmx supports no watchdog (NI-DAQmx help lists none for CompactRIO)."""
+    """A CompactRIO controller; it has no watchdog, since the NI-DAQmx help lists none for CompactRIO."""
     return DeviceModel("cRIO1", product, _CRIO, input_engines=_CRIO_INPUTS, output_engines=_CRIO_OUTPUTS)
 
 
@@ -117,7 +120,7 @@ CHASSIS: dict[str, tuple[int, DeviceModel]] = {
     "cRIO-9045": (8, _crio("cRIO-9045")),
     "cRIO-9049": (8, _crio("cRIO-9049")),
 }
-"""Number of slots, and model of the chassis, by name."""
+"""Number of slots and device model of each chassis, keyed by product name."""
 
 
 def _x_series(product: str, *, transfer_condition: bool) -> DeviceModel:
@@ -156,16 +159,16 @@ SINGLE: dict[str, DeviceModel] = {
 }
 
 NAMES = (*CHASSIS, *SINGLE)
-"""The devices that can be emulated, by name."""
+"""Names of the devices that can be emulated."""
 SUGGESTED = ("9205", "9263", "9401", "9485")
-"""Modules in a chassis by default: analogue inputs, analogue outputs, digital lines, relays."""
+"""Default modules of a chassis: analogue inputs, analogue outputs, digital lines and relays."""
 
 
 def build(device: str, modules: Sequence[str] = ()) -> tuple[DeviceModel, ...]:
     """The device; for a chassis, the chassis and its modules: `modules`, or by default `SUGGESTED`, from slot 1 on.
 
     Inputs 0, 1, 2, ... of every input module are wired to terminals 0, 1, 2, ... of the plant, in parallel. Raises
-    InvalidInput for an unknown device or module, for too many modules, and for modules without a chassis.
+    InvalidInput for an unknown device or module, for too many modules, and for modules of a device without slots.
     """
     if device in SINGLE:
         if modules:

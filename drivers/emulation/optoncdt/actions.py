@@ -60,7 +60,7 @@ class Mastering:
 
 
 class Actions:
-    """The actions of `sensor` by name; each returns the lines of its answer, or a pending answer.
+    """The actions of `sensor`, in `table` by command; each returns the lines of its answer, or a pending answer.
 
     Every action raises Refusal for an invalid request. `boot_time` is the duration of a reset [s].
     """
@@ -88,7 +88,7 @@ class Actions:
         return [f"{request.text} ok"] if self._sensor.settings.echo else []
 
     def require_professional(self) -> None:
-        """Raise Refusal at the user level USER, which has read access only."""
+        """Raise Refusal if the user level is USER."""
         if not self._sensor.settings.professional:
             raise Refusal(202, "Access denied")
 
@@ -167,7 +167,7 @@ class Actions:
         return self.done(request)
 
     def _measuring_settings(self, request: Request) -> list[str]:
-        """Store or restore the measurement settings; all names share one slot."""
+        """Store or restore the measurement settings; there is a single slot, so the setup name is ignored."""
         self.require_professional()
         sensor = self._sensor
         match request.parameters:

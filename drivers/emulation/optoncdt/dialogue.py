@@ -1,4 +1,4 @@
-"""The sensor's serial line, a pseudo-terminal that programs open like a serial port, and its command dialogue."""
+"""Pseudo-terminal that a client opens as the sensor's serial port, and the sensor's command dialogue."""
 
 import os
 import select
@@ -25,13 +25,13 @@ input speed.
 _MOST = 4096
 """Maximum number of bytes per read."""
 _CAPACITY = 640 * 1024
-"""Bytes that Linux keeps for a serial port whose reader is late (TTYB_DEFAULT_MEM_LIMIT). For a pseudo-terminal it
-keeps only 16 KiB, which 4000 measurements/s with counter and time stamp fill in a third of a second.
+"""Number of bytes that Linux buffers for a serial port (TTYB_DEFAULT_MEM_LIMIT). For a pseudo-terminal it buffers only
+16 KiB, which 4000 measurements/s with counter and time stamp fill in a third of a second.
 """
 
 
 class SerialLine:
-    """Buffer of the instrument's end of a serial line."""
+    """Base class for the instrument's end of a serial line: buffers the bytes that the system has not yet accepted."""
 
     def __init__(self) -> None:
         self._pending = b""

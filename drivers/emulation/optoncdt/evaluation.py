@@ -14,7 +14,7 @@ WORD = 3
 WORD_BITS = 30
 """Bits per value on the line, including a start bit and a stop bit per byte."""
 LAST_DISTANCE = 65520
-"""Code at the end of the reserve beyond the measuring range (manual of the optoNCDT 1420, p. 65)."""
+"""Code at the upper end of the reserve beyond the measuring range (manual of the optoNCDT 1420, p. 65)."""
 LAST_MASTERED = 262071
 """Largest code of a mastered distance; error codes are greater."""
 
@@ -94,8 +94,9 @@ class Evaluation:
         self._age = np.inf
 
     def codes(self, shares: Array, faults: NDArray[np.int64], settings: Settings) -> NDArray[np.int64]:
-        """Codes of the next measurements, shape (n,) with n > 0, after averaging, mastering and hold: those of the
-        distances `shares` (fractions of the range) where `faults` is zero, elsewhere the fault.
+        """Codes of the next n > 0 measurements, shape (n,), after averaging, mastering and hold. Where `faults` is
+        zero, `shares` is the distance (fraction of the range); elsewhere the code is the fault, unless the hold
+        replaces it.
         """
         valid = faults == 0
         shares = self._mean(np.where(valid, shares, np.nan), settings.average)
@@ -108,7 +109,7 @@ class Evaluation:
         return self._hold(np.where(valid, codes, faults), valid, settings.hold)
 
     def _mean(self, shares: Array, n: int) -> Array:
-        """Mean of the valid ones among the last `n` measurements; meaningless where the newest is invalid."""
+        """Mean of the valid values among the last `n` up to each measurement; meaningless where it is invalid."""
         known = np.concatenate((self._tail, shares))
         self._tail = known[known.size - min(n - 1, known.size) :]
         if n == 1:
@@ -134,8 +135,8 @@ class Evaluation:
 
 
 def faults_of(shares: Array) -> NDArray[np.int64]:
-    """The fault of each measurement, shape (n,), from `shares`, distances as fractions of the measuring range; 0 within
-    the range and its reserve.
+    """The fault of each measurement, shape (n,); 0 within the measuring range and its reserve. `shares` are distances
+    as fractions of the range, NaN without a target.
     """
     faults = np.zeros(shares.size, dtype=np.int64)
     if not (np.abs(shares - 0.5) <= 0.5 + _RESERVE).all():

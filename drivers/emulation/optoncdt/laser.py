@@ -40,8 +40,8 @@ class Line:
         """Whether an answer may split a value."""
 
     def carried(self, stream: Bytes, answer: bytes, now: float) -> Bytes:
-        """Bytes that reach the client under the present faults: the values of `stream`, with `answer` between two of
-        them.
+        """Bytes that reach the client under the present faults: the values of `stream`, with `answer` inserted at a
+        random position.
         """
         sent = self._with_answer(stream, answer)
         if now < self.silent_until:
@@ -57,8 +57,8 @@ class Line:
         return sent
 
     def misread(self, sent: Bytes, baud: int, read_at: int) -> Bytes:
-        """Noise that a client receives if it reads at `read_at` baud bytes that were sent at `baud`. The noise contains
-        no hyphen, so that it never resembles a prompt.
+        """Noise that a client set to `read_at` baud receives in place of `sent`, which was sent at `baud`. The noise
+        contains no hyphen, so it never resembles a prompt.
         """
         noise = self._random.integers(0, 256, round(sent.size * min(1.0, read_at / baud)), dtype=np.uint8)
         return np.where(noise == _HYPHEN, np.uint8(0), noise)
@@ -73,14 +73,14 @@ class Line:
 
 
 _TURN = 0.002
-"""Period at which the serial line is served [s]."""
+"""Pause between two services of the line [s]."""
 _RATES = (250.0, 500.0, 1000.0, 2000.0, 4000.0, 8000.0)
 """Measuring rates of a recent sensor [1/s]; older sensors lack the last rate (manual of the optoNCDT 1420, p. 84)."""
 _TARGETS = {"too close": Fault.TOO_CLOSE, "too far": Fault.TOO_FAR, "none": Fault.NO_PEAK, None: None}
 
 
 class EmulatedLaser:
-    """A sensor that measures `sight` with the errors of the simulated `laser`, on the serial port `port`.
+    """A sensor that measures `sight` with the errors of the simulated `laser`; a client opens `port`.
 
     The constructor switches the sensor on; its line is served from `start()` on. `as_found` are the settings at
     power-up; with the default ones, the sensor does not stream. `clock_error` is the relative error of its clock, by

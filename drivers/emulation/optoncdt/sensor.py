@@ -69,8 +69,8 @@ class Grid:
 
     @property
     def stamp_lag(self) -> float:
-        """Time from the last tick of the time stamp to an exposure [s]. It is that of the first exposure at the present
-        rate, and the same for all if a cycle is a whole number of ticks, as at all rates except 8 kHz.
+        """Time from the last tick of the time stamp to the first exposure at the present rate [s]. All later exposures
+        have the same lag if a cycle is a whole number of ticks, as at all rates except 8 kHz.
         """
         ticks = (float(self.times(np.array([self.first]))[0]) - self.epoch.now) * self._pace * TICKS
         return (ticks - floor(ticks)) / TICKS
@@ -90,8 +90,8 @@ _STATES = {
     Fault.TOO_CLOSE: 2 << 16 | 1 << 5,
     Fault.TOO_FAR: 2 << 16 | 1 << 6,
 }
-"""Status words: the light is green (1) or red (2); bits 2, 5 and 6 give the reason (manual of the optoNCDT 1420, p.
-66).
+"""Status words: bits 16 and 17 give the colour of the LED, green (1) or red (2); bits 2, 5 and 6 give the reason for
+red (manual of the optoNCDT 1420, p. 66).
 """
 
 Codes = NDArray[np.int64]

@@ -35,14 +35,13 @@ class Settings:
     average: int = 1
     """Measurements in the moving mean."""
     hold: float = 0.0
-    """Number of measurements for which the last valid value replaces an error; if infinite, until the next valid value.
-    """
+    """Largest number of successive errors that the last valid value replaces; infinite for no limit."""
     reduction: int = 1
-    """Output reduction: one in this number of measurements is sent."""
+    """Output reduction n: only every n-th measurement is sent."""
     reduced: tuple[str, ...] = ("RS422",)
     """The outputs to which the reduction applies."""
     trigger: Literal["NONE", "EDGE", "PULSE", "SOFTWARE"] = "NONE"
-    """With any value except NONE the sensor sends no output, since there is no trigger source."""
+    """With any value except NONE the sensor sends no measurements, since there is no trigger source."""
     laser_power: Literal["FULL", "OFF"] = "FULL"
     mastering: Mastering | None = None
     baud: int = 921_600
@@ -135,7 +134,7 @@ def _integer(field: str, allowed: Callable[[float], bool]) -> Command:
 
 
 def _measuring_rate(rates: tuple[float, ...]) -> Command:
-    """Command for the measuring rate, which it states in kHz; `rates` [1/s] are the permitted rates."""
+    """Command for the measuring rate, whose parameter is in kHz; `rates` [1/s] are the permitted rates."""
 
     def change(settings: Settings, parameters: list[str]) -> Settings:
         if (rate := 1e3 * number(single(parameters), float)) not in rates:

@@ -1,4 +1,4 @@
-"""The sensor's serial line as a TCP socket of this machine, as a serial device server provides it."""
+"""TCP socket on this machine in place of the sensor's serial line, as provided by a serial device server."""
 
 import socket
 from contextlib import suppress
