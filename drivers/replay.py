@@ -83,7 +83,8 @@ class ReplayRig(RigBase):
     The drive is checked as in every rig but has no effect. A block ends early at a gap or at the end of the recording;
     after a gap the next block begins at a later sample, and the samples of the gap consume no drive. `lead` defaults to
     the recording's lead. An optional `course` determines when blocks arrive, on a `clock` that starts at 0 with the
-    recording, when safety inputs open, and the clock alignments. The caller closes the recording after closing the rig.
+    recording, and when safety inputs open; it also supplies the clock alignments. The caller closes the recording after
+    closing the rig.
     """
 
     def __init__(

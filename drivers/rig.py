@@ -106,8 +106,8 @@ class OperatorTask(StrEnum):
     """Spring and block are removed, and the storeys are clamped to the table, so that the storeys move with it."""
     UNLOCK_FRAME = "unlock frame"
     HOLD_BLOCK = "hold block"
-    """As MOUNT_SPRING, but with the block clamped to the table, so that the block cannot lift and its end of the spring
-    does not move relative to the table.
+    """Same as MOUNT_SPRING, but the block is clamped to the table: it cannot lift, and its end of the spring does not
+    move relative to the table.
     """
     LOCK_TABLE = "lock table"
     """The table, with any specimen, is clamped to the ground at mid stroke; it must not be driven."""

@@ -18,7 +18,7 @@ _STILL_VELOCITY = 2.0e-4
 _STILL_DISPLACEMENT = 2.0e-4
 """Displacement of the table from mid stroke [m] below which the table is considered at rest."""
 _LONGEST_WAIT = 300.0
-"""Longest time to wait until the bench is at rest [s]; a toppled block held by its strap counts as at rest."""
+"""Longest simulated wait for the bench to come to rest [s]; a toppled block held by its strap counts as at rest."""
 _WARM_UP = 0.5
 """Settling time of filters and lasers at rest before the sample clock starts [s]."""
 
@@ -79,7 +79,7 @@ class SimulatedRig(ComputedRig):
         self.bench.mount(arrangement)
 
     def _come_to_rest(self) -> None:
-        """Coast at zero drive until the bench is at rest."""
+        """Coast at zero drive until the bench is at rest, for at most `_LONGEST_WAIT`."""
         # not done by `halt`, which must not wait because it may interrupt a read
         self.bench.disarm()
         waited = 0.0

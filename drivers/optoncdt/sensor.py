@@ -1,4 +1,4 @@
-"""A sensor on its serial line: opening, identification, configuration, reading."""
+"""A sensor on its serial line: opening, identification, configuration and reading."""
 
 from contextlib import suppress
 from math import isclose
@@ -15,7 +15,7 @@ from drivers.optoncdt.stream import Readings, Stream
 from sim.errors import InvalidInput
 
 _FIXED = ("AVERAGE NONE", "TRIGGER NONE", "OUTHOLD NONE", "OUTREDUCEDEVICE NONE")
-"""Commands that disable filter, trigger, holding of old values and output reduction."""
+"""Commands that disable averaging, the trigger, the holding of old values, and the output reduction."""
 
 
 def require_sensor(
@@ -114,13 +114,13 @@ _LOCK_TIME = 2.0
 """Longest wait for the first accepted value after the stream is switched on [s]."""
 _SILENT_PERIODS, _SILENT_TIME = 10.0, 0.4
 """Number of periods and time [s] without data, whichever is longer, after which a sensor counts as silent. The
-operating system may deliver received bytes in a thread of normal priority, which is delayed by tenths of a second while
-the processors are busy.
+operating system may deliver received bytes in a thread of normal priority, which may be delayed by tenths of a second
+while the processors are busy.
 """
 _QUIET, _DRAINED = 0.05, 0.5
 _COUNTING, _COUNTED = 0.5, 0.2
-"""Duration [s] of counting values, and largest accepted relative deviation from the set rate; adjacent rates differ by
-a factor of two.
+"""Time for which values are counted [s], and largest accepted relative deviation from the set rate; adjacent rates
+differ by a factor of two.
 """
 
 
@@ -180,7 +180,7 @@ class SerialLaser:
         return now() - self._stream.last_arrival > max(_SILENT_PERIODS / self._rate, _SILENT_TIME)
 
     def start(self) -> None:
-        """Switch the stream on, with index and time beginning at zero; returns as soon as values are accepted.
+        """Reset the sensor's counter and time stamp and switch the stream on; returns as soon as values are accepted.
 
         Raises DeviceTimeout if they do not arrive in the configured format, InvalidInput if they arrive at another
         rate, ConnectionLost if the port has disappeared.

@@ -1,7 +1,7 @@
 """Delay, sign and scale between two sensors of the same motion.
 
-A pure delay shifts the phase in proportion to the frequency, so the slope of the phase over frequency is the delay, for
-any motion. The phase at frequency zero determines the sign.
+A pure delay shifts the phase in proportion to the frequency, so the slope of the phase against frequency gives the
+delay, whatever the motion. The phase at zero frequency determines the sign.
 """
 
 from dataclasses import dataclass

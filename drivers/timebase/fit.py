@@ -11,13 +11,13 @@ _STRETCH = 0.2
 10 us in this time.
 """
 _KEPT = 120.0
-"""Duration of the history [s]: long enough for a rate accurate to 1e-6, too short for a quartz clock to drift much."""
+"""Duration of the history [s]: long enough for a rate accurate to 1e-6, so short that quartz clocks hardly drift."""
 
 
 @dataclass(frozen=True)
 class Points:
-    """Readings at ascending `seconds` of one clock, shape (n,); `delay`, shape (n,) [s], is the difference between the
-    readings of another clock and this one, of either sign.
+    """Readings at ascending `seconds` of one clock, shape (n,); `delay`, shape (n,) [s], is the simultaneous reading of
+    another clock minus that of this one, of either sign.
     """
 
     seconds: NDArray[np.float64]
@@ -35,7 +35,7 @@ class Bounds:
 
     @property
     def points(self) -> Points:
-        """The history: at most one reading per interval of 0.2 s, so about 600 in total."""
+        """The history: at most one reading per interval of 0.2 s, so at most about 600."""
         return self._points
 
     def add(self, seconds: NDArray[np.float64], delay: NDArray[np.float64]) -> None:
@@ -169,7 +169,7 @@ def floor_below(points: Points, slope: float) -> float:
 
 
 def typical(above: NDArray[np.float64]) -> float:
-    """Mean of exponentially distributed delays [s], estimated from their median, robust against stalls."""
+    """Mean of exponentially distributed delays [s], estimated from their median, so that stalls hardly affect it."""
     return float(np.median(above)) / np.log(2.0)
 
 

@@ -2,8 +2,8 @@
 
 Each rising edge occurs between the last measurement with the beam and the first one without it, which bounds the offset
 between the clocks to one measuring cycle. The spacing of the edges is a whole number of cycles plus the golden-ratio
-fraction of a cycle, so that their phases are evenly distributed over the cycle: the bounds of 40 edges differ by a 30th
-of a cycle, 8 us at 4000 1/s (three-gap theorem).
+fraction of a cycle, so that their phases are almost evenly distributed over the cycle: the bounds from 40 edges differ
+by at most 3.5 % of a cycle, 9 us at 4000 1/s (three-gap theorem).
 """
 
 from dataclasses import dataclass
@@ -59,9 +59,7 @@ def expected_uncertainty(rate: float) -> float:
 _ERROR = 0.014
 """Root mean square error, over all phases, of the midpoint between the bounds from 40 edges, in measuring cycles."""
 _RATES = 1e-6 * np.arange(-150.0, 151.0)
-"""Deviations from the given rate that are searched [1]; a rate estimated from arrival times is wrong by a few tens of
-ppm at worst.
-"""
+"""Deviations from the given rate that are searched [1], up to almost four standard uncertainties."""
 _RATE_SPREAD = 40e-6
 """Standard uncertainty of the given rate in the first second of a run, on a busy computer [1]."""
 
@@ -85,7 +83,7 @@ def marked_point(
     `time`, shape (n,), contains the ascending times of the measurements on the sensor's clock [s]; `is_lit`, shape
     (n,), is False for those without the beam. `rate` is the number of seconds of the sample clock per second of the
     sensor's clock; `rough` is the time on the sample clock at which the sensor's clock reads 0 [s], known to within
-    half the time between two pulses. Returns None if fewer than half of the edges are found.
+    half the time between two pulses. Returns None if fewer than 20 edges are found.
     """
     onsets = np.flatnonzero(is_lit[:-1] & ~is_lit[1:]) + 1
     if not onsets.size:
@@ -106,7 +104,7 @@ def marked_point(
     rates = rate + _RATES[:, None]
     low = (edges - rates * (time[onsets] - middle)).max(axis=1)
     high = (edges - rates * (time[onsets - 1] - middle)).min(axis=1)
-    # for each rate, all points between the bounds are equally probable; rates near the given one are more probable
+    # the point is assumed uniformly distributed between the bounds at each rate, and the rate normally distributed
     width, centre = high - low, 0.5 * (low + high)
     weight = np.maximum(width, 0.0) * np.exp(-0.5 * (_RATES / _RATE_SPREAD) ** 2)
     if not weight.any():

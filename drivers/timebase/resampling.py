@@ -65,7 +65,8 @@ class Resampler:
         """Counts at sensor times, shape (n,), by linear interpolation between readings.
 
         Where one of the two readings is a fault mark, that mark is returned; where a reading is missing, and before the
-        first one, the mark of lost values; after the last reading, and at a time that is NaN, the mark of late values.
+        first one, the mark of lost values; after the last reading, at a time that is NaN, and if there are fewer than
+        two readings, the mark of late values.
         """
         seen = np.full(times.shape, self._late_mark, dtype=np.int16)
         if self._end < 2:

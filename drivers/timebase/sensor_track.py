@@ -14,7 +14,8 @@ from drivers.timebase.resampling import Marks, Plausibility, Resampler
 
 @dataclass(frozen=True)
 class Line:
-    """Linear relation of two clocks: `time` [s] on the first is `seconds` [s] on the second, `rate` times as fast.
+    """Linear relation of two clocks: `time` [s] on the first is `seconds` [s] on the second, which advances by `rate`
+    per second of the first.
 
     The point (`time`, `seconds`) is close to the present, to avoid rounding errors on clocks that have run for weeks.
     """
@@ -33,7 +34,9 @@ class Line:
 
 
 _SLEW = 50e-6
-"""Largest slew rate of the clock relation [s/s]: if the target moves at 1 m/s, its position error grows by 50 um/s."""
+"""Largest slew rate of the clock relation [s/s]: if the target moves at 1 m/s, its position error changes by at most
+50 um per second.
+"""
 _FIRST_SLEW = 500e-6
 """Largest slew rate in the first phase of a run [s/s], when the clock relation is only known to a fraction of a
 millisecond.
@@ -108,7 +111,7 @@ class SensorTrack:
     `rate` is its measuring rate [1/s]; `delay` [s] is added to the estimated times of its values. `marked` converts its
     codes to counts up to +-`largest`, and its error words to fault marks outside that range; `marks` are the fault
     marks of missing, late and implausible values. Values that change by more than `largest_step` counts per measurement
-    are implausible, see `Plausibility`. A restart of the sensor's clock begins a new history.
+    are implausible (see `Plausibility`). A restart of the sensor's clock begins a new history.
     """
 
     def __init__(
@@ -132,7 +135,8 @@ class SensorTrack:
         self._asked = 0.0
 
     def begin(self) -> None:
-        """Begin a run: the numbers of values are reset; the history of the sensor's clock is kept."""
+        """Begin a run: reset the numbers of values, lost values and so on, but keep the history of the sensor's clock.
+        """
         self._course = Course()
         self._mark = None
         self._values = self._lost = self._late = 0
@@ -176,8 +180,8 @@ class SensorTrack:
         return mark is not None
 
     def counts(self, clock: SampleClock, first: int, n: int, sample_rate: float) -> NDArray[np.int16]:
-        """Counts at `n` samples from `first` on, shape (n,): interpolated between two values, or the fault mark of one
-        of them. Blocks must be requested in order.
+        """Counts at `n` samples from `first` on, shape (n,), interpolated between two values; fault marks where this is
+        not possible. Blocks must be requested in order.
         """
         self._asked = (first + n) / sample_rate
         line = self._line(clock)

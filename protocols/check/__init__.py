@@ -1,1 +1,1 @@
-"""Loop check of a bench: a low-level test of every path from drive to sample before an experiment."""
+"""Loop check of a bench: a test of the sensors and the shaker at low amplitude before an experiment."""

@@ -23,8 +23,8 @@ Amplitudes = NDArray[np.complex128]
 class Sines:
     """Complex amplitudes c at `omega` [rad/s], shape (n,) each, with signal = Re(c exp(-i omega t)).
 
-    The four sensors measure a common motion. `drive` is in volts and `acceleration` in m/s2; all
-    other amplitudes are displacements [m]. `accelerometer` is the displacement computed as acceleration / -omega^2.
+    With lasers on the ground, the four sensors measure a common motion. `drive` is in volts and `acceleration` in m/s2;
+    all other amplitudes are displacements [m]. `accelerometer` is the displacement computed as acceleration / -omega^2.
     """
 
     omega: NDArray[np.float64]
@@ -77,8 +77,8 @@ def table_delay_lines(
     sines: Sines, parameters: CheckParameters, sample_rate: float, *, lasers: bool, most: float = inf
 ) -> Iterator[CheckLine]:
     """Lines for the delay of the accelerometer against the table's displacement sensor and, with `lasers` on the
-    ground, of each laser against the accelerometer, at most `most` [s]. Together with `delay_lines`, every pair of
-    channels is compared.
+    ground, of each laser against the accelerometer; the latter has limits if `most` [s], its largest magnitude, is
+    finite. Together with `delay_lines`, every pair of these channels is compared.
 
     The limits include half a sample: the lag of an acceleration that follows each step of the zero-order-hold output.
     """

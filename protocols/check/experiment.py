@@ -1,8 +1,8 @@
 # pyright: reportUnknownMemberType=false
-"""Loop check of a bench: tests every channel and the path through the shaker at low level.
+"""Loop check of a bench: tests the channels at rest, then drive, shaker and sensors at low amplitude.
 
-1. The storeys are clamped to the table, so that all sensors measure one motion. All channels are acquired at rest.
-2. If every sensor gives valid samples, the drive is calibrated and sines of equal velocity amplitude are driven.
+1. The storeys are clamped to the table, so that they move with it. All channels are acquired at rest.
+2. If no check at rest fails, the drive is calibrated and sines of equal velocity amplitude are driven.
 3. The clamps are removed.
 """
 
@@ -84,7 +84,7 @@ class LoopCheck(Prepared[CheckParameters]):
             raise InvalidInput("velocity", velocity, f"it must not exceed limits.velocity = {limits.velocity:g} m/s")
         if velocity / slow > reach:
             needs = (
-                f"a velocity of {velocity:g} m/s at this frequency requires {1e3 * velocity / slow:.1f} mm of stroke"
+                f"a velocity of {velocity:g} m/s at this frequency is an amplitude of {1e3 * velocity / slow:.1f} mm"
             )
             raise InvalidInput("omega", slow, f"{needs}, but the bench allows {1e3 * reach:.1f} mm")
         if velocity * fast > limits.acceleration:
@@ -234,7 +234,7 @@ def _table(lines: Sequence[CheckLine]) -> str:
 
 
 def _margins(lines: Sequence[CheckLine]) -> "Figure":
-    """Figure of all lines that have limits, on a scale from the lowest (-1) to the highest allowed value (+1)."""
+    """Figure of all lines with two limits, on a scale from the lowest (-1) to the highest allowed value (+1)."""
     judged = [(line, position) for line in lines if (position := _position(line)) is not None]
     figure = new_figure(8.0, 1.2 + 0.24 * len(judged))
     panel = figure.subplots()
@@ -266,7 +266,9 @@ def _cells(line: CheckLine) -> tuple[str, ...]:
 
 
 def _position(line: CheckLine) -> float | None:
-    """Measured value on a scale from -1 to 1 between its limits, clipped beyond `_OUTSIDE`; None without limits."""
+    """Measured value on a scale from -1 to 1 between its limits, clipped at +-`_OUTSIDE`; None unless it has two
+    limits.
+    """
     if line.measured is None or line.lowest is None or line.highest is None:
         return None
     middle, half = 0.5 * (line.lowest + line.highest), 0.5 * (line.highest - line.lowest)

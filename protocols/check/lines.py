@@ -39,8 +39,8 @@ _ALONE = "nothing opens the enable relay if the program crashes: wire a heartbea
 
 
 def resting_lines(samples: RestSamples, parameters: CheckParameters, accuracy: SensorAccuracy) -> Iterator[CheckLine]:
-    """Two lines for each channel: fraction of valid samples, and noise if enough samples are valid. The noise of a
-    laser may be as large as its resolution; larger noise originates in the target or the bench.
+    """One or two lines for each channel: the fraction of valid samples and, if enough samples are valid, the noise. The
+    noise of a laser may be as large as its resolution; larger noise originates in the target or the bench.
     """
     limits = {
         TABLE_DISPLACEMENT: parameters.displacement_noise,
@@ -58,7 +58,8 @@ def resting_lines(samples: RestSamples, parameters: CheckParameters, accuracy: S
 
 
 def safety_lines(configuration: BenchConfiguration) -> Iterator[CheckLine]:
-    """Lines for safety inputs and a missing watchdog, after the acquisition at rest; none for a simulated bench.
+    """Lines for the safety inputs, and for the lack of both watchdog and heartbeat relay, after the acquisition at
+    rest; none for a simulated bench.
 
     Inputs that are read have passed, since an open input would have prevented arming or ended the check; missing inputs
     are untested.
@@ -100,7 +101,8 @@ def alignment_lines(alignments: Sequence[Alignment], configuration: BenchConfigu
 
 
 def drive_lines(sines: Sines, parameters: CheckParameters, configuration: BenchConfiguration) -> Iterator[CheckLine]:
-    """Lines for the dead time and for the drive at each frequency, with limits if the shaker is known."""
+    """Lines for the dead time and for the drive at each frequency, the latter with limits if the shaker is simulated.
+    """
     yield judged(
         "drive",
         "dead time to table_acceleration",
@@ -169,7 +171,8 @@ def _noise(channel: Channel, counts: Counts, limit: float | None) -> CheckLine:
 
 
 def _reason(channel: Channel, invalid: Counts) -> str:
-    """Cause of invalid samples, inferred from the most frequent count."""
+    """Cause of invalid samples, inferred from the most frequent invalid count, with a remedy; empty if all are valid.
+    """
     if invalid.size == 0:
         return ""
     values, numbers = np.unique(invalid, return_counts=True)

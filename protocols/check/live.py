@@ -12,8 +12,8 @@ CHANNELS = (TABLE_DISPLACEMENT, TABLE_ACCELERATION, *STOREYS)
 
 
 def check_view(run: LiveRun) -> LiveView:
-    """The published lines, followed by the pending ones, as far as they are known in advance. None is pending after a
-    line reports that the motion failed or was not permitted.
+    """The published lines, followed by the pending ones, as far as they are known in advance. No line is pending once
+    the motion has failed or been refused.
     """
     lines = [point for point in run.points if isinstance(point, CheckLine)]
     known = {(line.subject, line.what) for line in lines}

@@ -1,4 +1,4 @@
-"""Loop check of a bench: every path from drive to sample."""
+"""Protocol of the loop check: its parameters, and the text of its lines."""
 
 from typing import Annotated
 
@@ -46,7 +46,9 @@ class CheckParameters(Parameters):
         gt=0,
         le=0.1,
     )
-    u1_error: float = quantity(0.01, "1", "largest allowed relative error of u1 due to a laser's delay", gt=0, lt=0.5)
+    u1_error: float = quantity(
+        0.01, "1", "largest allowed relative error of the first storey's drift due to a laser's delay", gt=0, lt=0.5
+    )
     highest_omega: float = quantity(
         20.0, "rad/s", "highest frequency of later tests, where a delay has the largest effect", gt=0, le=60
     )
@@ -86,8 +88,8 @@ PROTOCOL = Protocol(
     summary="Check the loop of the configured bench at low level, and give a remedy for each check that fails.",
     details=(
         "Records every channel at rest, then drives sines of equal velocity with the frame locked to the "
-        "table, and checks polarity, scale and delay of all sensors, and the drive. The exit code is 1 if a check "
-        "fails."
+        "table, and checks the drive and the polarity, scale and delay of the table's sensors and of lasers on the "
+        "ground. The exit code is 1 if a check fails."
     ),
     example="--config bench.toml",
     parameters=CheckParameters,

@@ -91,7 +91,7 @@ def budget_parts(quantity: str, results: Sequence[Budgeted]) -> list[Part]:
             figure,
             f"Contributions to the uncertainty of {quantity}: each bar is the expanded uncertainty (k = 2), divided "
             "in proportion to the contributions to the variance.",
-            "Horizontal bars of the expanded uncertainty, divided by contribution.",
+            "Horizontal bars of the expanded uncertainty, split into contributions.",
         ),
     ]
 
@@ -136,7 +136,7 @@ def _sources(names: Sequence[str], results: Sequence[Budgeted]) -> Table:
     caption = (
         "Origin of the contributions: type of evaluation (GUM: A from repeated observations, B from other information) "
         "and largest standard uncertainty"
-        + ("; errors that are correlated between the coupled and the bare test cancel" if correlated else "")
+        + ("; errors cancel as far as they are correlated between the coupled and the bare test" if correlated else "")
     )
     return Table(caption, columns, rows)
 

@@ -25,9 +25,7 @@ ENOUGH = 0.75
 """Minimum fraction of cycles with nearly complete samples."""
 
 AUDIBLE = 5.0
-"""Smallest significant response of the table's acceleration to the drive, in standard uncertainties; the probability
-that noise exceeds it is 1e-5.
-"""
+"""Smallest significant response of the table's acceleration to the drive, in standard uncertainties."""
 
 _PROBED = 8
 """Number of cycles in each probe; the noise is estimated from their scatter."""
@@ -41,8 +39,8 @@ def calibrate_drive(
 ) -> Generator[Step, Outcome, DriveCalibration | Fallen]:
     """Measure the table's response to the drive at `omegas` [rad/s] with table accelerations of `level` [m/s2].
 
-    Without a `start`, the response is first probed in two steps, beginning with a command too small to cause damage;
-    the response at each frequency is then the initial value for the next.
+    Without a `start`, the response is first probed with commands of 0.02 V and 0.2 V; the calibration is then extended
+    by each measured frequency before the next one is measured.
     """
     known = start is not None
     if start is None:
@@ -72,8 +70,8 @@ def calibrate_drive(
 
 
 def probed_drive(omega: float) -> Generator[Step, Outcome, DriveCalibration]:
-    """Frequency-independent calibration with the gain of the drive at `omega` [rad/s], measured with two commands that
-    are too small to cause damage.
+    """Frequency-independent calibration with the gain of the drive at `omega` [rad/s], measured with commands of 0.02 V
+    and 0.2 V.
 
     The mean over the cycles is compared with their scatter, to separate a response from noise of any spectrum. Raises
     Unmeasurable if the table does not respond.

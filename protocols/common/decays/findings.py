@@ -145,7 +145,9 @@ def mass_covariance(parameters: DecayParameters, known: Identified | None) -> ND
 
 
 def check_masses(parameters: DecayParameters, configuration: BenchConfiguration) -> None:
-    """Raise InvalidInput for mass uncertainties in the parameters if the specimen file includes the masses."""
+    """Raise InvalidInput for a mass uncertainty or correlation other than the default if the specimen file includes
+    both masses.
+    """
     if (known := known_masses(configuration.identified)) is None:
         return
     for item in ("mass_uncertainty", "mass_correlation"):

@@ -17,7 +17,7 @@ from protocols.common.decays.parameters import DecayPoint
 Array = NDArray[np.float64]
 
 SIGNIFICANT = 2.576
-"""Threshold of a significant difference, in standard uncertainties: the normal quantile for 99 %."""
+"""Threshold of a significant slope or difference, in standard uncertainties: two-sided normal quantile for 99 %."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -44,7 +44,7 @@ class DecayParameters(Parameters):
         0.0005, "kg", "standard uncertainty of the weighed mass of each storey", ge=0, le=0.1
     )
     mass_correlation: float = quantity(
-        0.0, "1", "correlation of the errors of the two masses: 1 if both are errors of one balance", ge=0, le=1
+        0.0, "1", "correlation of the errors of the two masses: 1 if both are due to the same balance", ge=0, le=1
     )
 
 

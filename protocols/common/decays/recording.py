@@ -30,10 +30,10 @@ REST = 2.0
 """Time at rest before each recording, during which the signals are zeroed [s]."""
 
 STILL = 5e-5
-"""Scatter below which the storeys are considered at rest [m]; larger than that due to the resolution of a laser."""
+"""Standard deviation of u1 and the drift up to which the storeys are considered at rest [m]."""
 
 WAITING = 45.0
-"""Expected time of a recording in addition to the duration of its drive [s]: settling of the storeys, rest, ramp."""
+"""Expected time of a recording in addition to the duration of its drive [s]: settling of the storeys, rest and ramp."""
 
 DETECTABLE = 20.0
 """Minimum ratio of the drift in a probe to the noise."""
@@ -94,8 +94,8 @@ def record(volts: Array, sample_rate: float, pace: Pace, activity: str) -> Gener
 def find_level(
     pulse: Pulse, drift: float, configuration: BenchConfiguration, pace: Pace
 ) -> Generator[Step, Outcome, float]:
-    """Find the peak drive [V] of the pulse that causes a peak of `drift` [m], or the largest drift that the limits
-    allow.
+    """Find the peak drive [V] of the pulse that causes a peak drift of `drift` [m], or the largest drift that the
+    limits allow.
 
     Raises Unmeasurable if the frame does not respond, if the limits allow less than `LEAST`, or if the drift is not
     reached after `_MOST` probes.
