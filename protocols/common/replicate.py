@@ -1,4 +1,4 @@
-"""Replication stage of several protocols, which iterates the drive until the table follows a motion."""
+"""Replication, a stage of several protocols: iterates the drive so that the table follows a motion."""
 
 from collections.abc import Callable, Generator
 from dataclasses import dataclass
@@ -31,7 +31,7 @@ REST = 2.0
 class PassFinished(Event):
     """The end of pass `number` of a replication, the iteration that makes the table follow `motion`.
 
-    `error`, `repeatable`, `peak_error` and `spectrum_error` are relative, see `bench.control.passes.Pass`; `text`
+    `error`, `repeatable`, `peak_error` and `spectrum_error` are relative (see `bench.control.passes.Pass`); `text`
     summarises the pass.
     """
 

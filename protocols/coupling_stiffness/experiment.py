@@ -50,7 +50,9 @@ BARE, SPRING = "bare frame", "spring of beta = {:g}"
 BY_HAND = 120.0
 """Expected time to change the specimen by hand [s]."""
 
-STILL_CLAMPED = "THE BLOCK IS STILL CLAMPED to the table: remove clamp, spring and block before the table is driven."
+STILL_CLAMPED = (
+    "THE BLOCK IS STILL CLAMPED to the table: remove the clamp, the spring and the block before the table is driven."
+)
 
 
 class CouplingStiffness(Prepared[CouplingStiffnessParameters]):

@@ -7,7 +7,7 @@ from protocols.common.decays.live import decay_panel
 
 
 def springs_view(run: LiveRun) -> LiveView:
-    """Stiffness against the beta on the label, from every decay and from all decays of a spring; the last decay."""
+    """Stiffness against the beta on the label, from every decay and from all decays of a spring, and the last decay."""
     panel = Panel(
         "stiffness of the springs",
         ("beta on the label", "1"),

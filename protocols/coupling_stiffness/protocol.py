@@ -50,7 +50,7 @@ class SpringPoint(Parameters):
     k2_agrees: bool | None = quantity(
         None,
         "",
-        "whether k2 agrees with k2 of the bare frame within the uncertainty of the difference; absent if not compared",
+        "whether the difference from k2 of the bare frame is insignificant (99 %); absent if not compared",
     )
     k_c_parts: str = quantity("", "", "standard uncertainty of k_C by contribution, largest first, as JSON")
     xi1: float = decay_field("xi1")

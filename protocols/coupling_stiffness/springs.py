@@ -115,8 +115,8 @@ def frame_change(bare: FrameResult, known: Identified | None) -> str | None:
 
 
 def replaces(bare: FrameResult, known: Identified) -> bool:
-    """Whether this run's frame replaces the previously identified one, because the frame has changed or the new
-    uncertainty is smaller.
+    """Whether this run's frame replaces the previously identified one, because the latter is incomplete, the frame has
+    changed, or the new uncertainty is smaller.
 
     Uncertainties are compared by the determinant of the covariance of k1, k2, xi1 and xi2.
     """

@@ -33,7 +33,8 @@ class Predicted:
     """Predicted gains under the motions of a bare and a coupled test.
 
     `nominal` contains alpha_1 and alpha_2 of the nominal specimen, NaN if its block topples. `alpha_1` and `alpha_2`,
-    shape (n,), are the gains of the draws, NaN where the block topples; `times` [s] are the times of overturning.
+    shape (n,), are the gains of the draws, NaN where the block topples; `times` [s] are the times of overturning in
+    these draws.
     """
 
     nominal: tuple[float, float]
@@ -103,7 +104,8 @@ class _Runs:
         return self._bare.run(specimen.bare(), acceleration, tolerance=TOLERANCE).peaks
 
     def gains(self, specimen: Specimen, acceleration: Array, bare: Callable[[], Peaks]) -> tuple[float, float, float]:
-        """alpha_1, alpha_2, and the time of overturning [s]; NaN for those that do not exist."""
+        """alpha_1, alpha_2 and the time of overturning [s]: the gains are NaN if the block topples, otherwise the time.
+        """
         moved = self._coupled.run(specimen, acceleration, tolerance=TOLERANCE, overturning_angle=CATCH_ANGLE)
         if moved.status is not Status.COMPLETED:
             return nan, nan, moved.end_time

@@ -35,7 +35,7 @@ from sim.sweep import in_threads
 Array = NDArray[np.float64]
 
 STEP = 0.005
-"""Sample interval of a simulated motion [s]; peaks between samples are underestimated by at most 0.2 %."""
+"""Sample interval of a simulated motion [s]; peaks of a sine of 4 Hz are underestimated by at most 0.2 %."""
 
 TOLERANCE = 1e-7
 
@@ -101,8 +101,8 @@ DRAWS, SEED = 32, 8
 """Number of specimens drawn in addition to the nominal one, and random seed."""
 
 OFF = 0.03
-"""Largest relative error of the table's motion; also the relative allowance for noise and friction in the demands on
-table and shaker.
+"""Assumed largest relative error of the table's motion; also the relative allowance for noise and friction in the
+demands on table and shaker.
 """
 
 IMPACTS = 0.15
@@ -111,7 +111,7 @@ compensate.
 """
 
 OFF_MIDDLE = 0.015
-"""Largest offset of a storey at rest from the middle of the laser's range, relative to half the range."""
+"""Assumed largest offset of a storey at rest from the middle of the laser's range, relative to half the range."""
 
 _RAISED = ("acceleration", "force", "current")
 
@@ -151,9 +151,9 @@ def combinations(
 
 
 def beyond_limits(found: Sequence[Combination], configuration: BenchConfiguration) -> LeftOut:
-    """Combinations that exceed the limits even with the nominal specimen, with the reason. If a record exceeds them
-    with the bare frame, it is omitted with all springs; if it exceeds them with all springs, it is omitted with the
-    bare frame. Empty if no combination would remain: the preflight then refuses the campaign.
+    """Combinations that exceed a limit even with the nominal specimen, with the reason. A record that exceeds one with
+    the bare frame is omitted with all springs, and one that exceeds a limit with every spring is omitted with the bare
+    frame. Empty if no combination would remain: the preflight then refuses the campaign.
     """
     bound = bounds(configuration)
     left = LeftOut()

@@ -48,7 +48,7 @@ FALLEN_REQUEST = "The block has fallen: set it upright again."
 OMITTED = "omitted, since it would exceed a limit"
 
 SEED = 5
-"""Seed of the Monte Carlo simulation for the first point; each further point uses the next seed."""
+"""Seed of the Monte Carlo simulations: the k-th played point, k = 1, 2, ..., uses `SEED` + k."""
 
 
 BETWEEN = 45.0
@@ -164,8 +164,8 @@ class EarthquakePlan:
         try:
             observed = observe(outcome.signals, shaking.target.rest, rate)
         except InvalidInput as lost:
-            yield Publish(Warned(f"{shaking.name} has no measurable peak with the bare frame: {lost}"))
-            return f"the bare frame has no measurable peak: {lost}"
+            yield Publish(Warned(f"{shaking.name}: the test of the bare frame cannot be evaluated: {lost}"))
+            return f"the test of the bare frame cannot be evaluated: {lost}"
         self._histories.bare(shaking, outcome.signals, History.of(self._specimen.bare(), observed.base).drift)
         return BareTest(
             replication.drive,
@@ -218,7 +218,7 @@ class EarthquakePlan:
             try:
                 observed = observe(outcome.signals, shaking.target.rest, rate)
             except InvalidInput as lost:
-                return unplayed_point(shaking, specimen.label or 0.0, target, bare, f"no peak was detected: {lost}")
+                return unplayed_point(shaking, specimen.label or 0.0, target, bare, f"not evaluated: {lost}")
             expected = History.of(specimen, observed.base).drift
             self._histories.coupled(shaking, specimen.label or 0.0, outcome.signals, expected)
             return measured_point(
@@ -263,7 +263,7 @@ class EarthquakePlan:
 def table_model(
     source: TableSource, configuration: BenchConfiguration, pace: Pace
 ) -> Generator[Step, Outcome, TableModel]:
-    """The stored table model, or a newly identified one; in both cases the bare frame is mounted first."""
+    """The stored table model, or a newly identified one; in both cases the spring and the block are removed first."""
     if source.model is not None or source.plan is None:
         assert source.model is not None
         bare = configuration.known_specimen.bare()

@@ -48,7 +48,7 @@ class EarthquakeParameters(Parameters):
     longest: float = quantity(
         100.0,
         "s",
-        "longest duration that is played; of a longer record, the part with the largest Arias intensity",
+        "longest played duration; of a longer record, the part with the largest Arias intensity is played",
         ge=5,
         le=3600,
     )
@@ -84,8 +84,8 @@ class EarthquakeParameters(Parameters):
     draws: int = quantity(
         200,
         "1",
-        "number of Monte Carlo draws for each prediction; half as many for an exactly known specimen, a quarter for "
-        "each contribution",
+        "number of Monte Carlo draws for each prediction; half as many are used for an exactly known specimen, and a "
+        "quarter as many for each contribution",
         ge=40,
         le=5000,
     )
@@ -148,13 +148,12 @@ class EarthquakePoint(Parameters):
         None, "1", "predicted probability that the block topples, given the uncertainty of specimen and motion"
     )
     overturned_s: float | None = quantity(
-        None, "s", "time at which the block finally passed its critical angle, accurate to about 0.3 s"
+        None, "s", "time at which the block finally passed its critical angle, accurate to about 0.4 s"
     )
     overturned_predicted_s: float | None = quantity(
         None,
         "s",
-        "median of the predicted times at which the block reaches 0.35 rad, about 0.45 s after it passes its critical "
-        "angle",
+        "median of the predicted times at which the block reaches 0.35 rad; it passes its critical angle earlier",
     )
     drift_peak_m: float | None = quantity(None, "m", "peak drift of the coupled frame")
     bare_drift_peak_m: float | None = quantity(None, "m", "peak drift of the bare frame")

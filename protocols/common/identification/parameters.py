@@ -12,7 +12,7 @@ class IdentifyParameters(Parameters):
     beta: float | None = quantity(
         None,
         "1",
-        "stiffness ratio of the spring that couples the block; if absent, the bare frame without block",
+        "stiffness ratio of the spring that couples the block; if absent, only the bare frame is on the table",
         gt=0,
         le=100,
         usual=COUPLING,
@@ -34,14 +34,15 @@ class IdentifyParameters(Parameters):
     corner: float = quantity(
         1.0,
         "Hz",
-        "frequency below which the lines have equal displacement amplitudes, and above which equal accelerations",
+        "frequency below which the lines have equal displacement amplitudes, and above which they have equal "
+        "acceleration amplitudes",
         gt=0,
         le=50,
     )
     level: float = quantity(
         0.6,
         "m/s2",
-        "peak of the table's acceleration, reduced if the bench requires it or to keep the block at rest",
+        "peak of the table's acceleration, reduced if a limit of the bench or the resting block requires it",
         gt=0,
     )
     period: float = quantity(8.0, "s", "period of the multisines, the inverse of their line spacing", ge=0.5, le=120)

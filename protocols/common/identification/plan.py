@@ -1,7 +1,7 @@
 """Steps of an identification.
 
-1. The specimen is mounted. The table is probed with increasing drive: the first one is too small to cause damage, the
-   last one reaches the level of the multisines.
+1. The specimen is mounted. The table is probed with increasing drive, from a peak of 0.02 V up to the level of the
+   multisines.
 2. Multisines with random phases are played, each from rest; their first periods are discarded.
 3. Response, noise and distortion are computed from the periods.
 """
@@ -42,7 +42,7 @@ REST = 2.0
 """Time at rest before each drive, during which the signals are zeroed [s]."""
 
 OVERHEAD = 12.0
-"""Time required in addition to the duration of the drive [s]: rest, settling of the storeys, ramp."""
+"""Time required in addition to the duration of the drive [s]: rest, settling of the storeys, and ramp."""
 
 
 @dataclass
@@ -73,7 +73,7 @@ class Rules:
         return Progress(self.gone / self.expected, self.expected - self.gone, activity)
 
     def remains(self, seconds: float) -> None:
-        """Set the expected remaining time [s], which is corrected because the number of probes depends on the table."""
+        """Correct the expected remaining time [s], since the number of probes depends on the table."""
         self.expected = self.gone + seconds
 
     def watch(self) -> Callable[[Array], Event]:

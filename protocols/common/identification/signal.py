@@ -132,7 +132,9 @@ def drive_for(motion: Complex, response: Complex, grid: Grid, knee: float) -> Co
 
 
 def measured_peak(motion: Complex, grid: Grid, knee: float) -> float:
-    """Peak [m/s2] of an acceleration, from its lines up to half the `knee` [Hz], which no filter attenuates."""
+    """Peak [m/s2] of an acceleration, from its lines up to half the `knee` [Hz], which filters hardly attenuate, or
+    from all lines if none is below.
+    """
     seen = grid.frequency <= 0.5 * knee
     seen = seen if seen.any() else np.ones(seen.shape, np.bool_)
     return float(np.abs(waveform(grid.lines[seen], motion[seen], grid.samples)).max())
@@ -147,7 +149,7 @@ SHARE = 0.75
 """Fraction of each limit that is used."""
 
 BLOCK_SHARE = 0.6
-"""Fraction of the uplift moment that is used; the margin covers the uncertainty of spring, frame and base."""
+"""Fraction of the uplift moment that is used; the rest is a margin for the uncertainty of spring, frame and base."""
 
 
 @dataclass(frozen=True, eq=False)

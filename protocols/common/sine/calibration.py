@@ -1,4 +1,4 @@
-"""Stages of a sine test before its starts and after its dwells: calibrations of the drive, end of the test."""
+"""Stages of a sine test before its starts and after its dwells: calibrations of the drive, and end of the test."""
 
 from collections.abc import Generator, Sequence
 

@@ -33,8 +33,7 @@ from sim.specimen import Specimen
 from sim.sweep import Done, in_threads
 
 HOLD, BARE_HOLD = 20.0, 40.0
-"""Simulated durations of a stage's last sine, with the block and with the bare frame [s], longer than the transients.
-"""
+"""Simulated durations of a stage's last sine, with the block and with the bare frame [s]."""
 
 PROBES = (PROBE, 10.0 * PROBE)
 """Amplitudes [V] of the probes of an unknown table."""
@@ -49,7 +48,7 @@ maximum.
 
 RIPPLE = 0.03
 """Relative allowance, in the demands on table and drive, for noise and for the effects of friction that a calibration
-at half the level does not detect.
+at a lower level does not detect.
 """
 
 IMPACTS = 0.15
@@ -58,7 +57,7 @@ cancelled.
 """
 
 OFF_MIDDLE = 0.015
-"""Largest offset of a storey at rest from the middle of the laser's range, relative to half the range."""
+"""Assumed largest offset of a storey at rest from the middle of the laser's range, relative to half the range."""
 
 _RAISED = ("acceleration", "force", "current", "drive_slew")
 """Quantities increased by impacts."""
@@ -153,8 +152,8 @@ def _measured(omega: float, level: float) -> tuple[Segment, Segment]:
 
 
 def slow(specimen: Specimen, omega: float, amplitude: float) -> bool:
-    """Whether the rocking orbit at `omega` [rad/s] and `amplitude` [m/s2] is expected to be held, because disturbances
-    of it grow or hardly decay.
+    """Whether the rocking orbit at `omega` [rad/s] and `amplitude` [m/s2] is expected to need a hold, because
+    disturbances of it grow or hardly decay.
     """
     branch = predict_gain(specimen, omega, amplitude).rocking
     return branch is not None and branch.multiplier > SLOW
@@ -169,8 +168,8 @@ def demands_of(
     """Demands of all trials.
 
     `steady`, if given, returns the steady motion at a stiffness ratio and a frequency [rad/s], which is evaluated as
-    well. A drawn specimen and the error of its drive are used for all stages. Raises InvalidInput for a table model
-    that cannot be read or does not cover the frequencies.
+    well. Each drawn specimen and its drive error are used for all stages. Raises InvalidInput for a table model that
+    cannot be read or does not cover the frequencies.
     """
     response = response_of(configuration)
     factors = np.concatenate(([1.0], 1.0 + DRIVE * np.random.default_rng(SEED).uniform(-1.0, 1.0, DRAWS)))

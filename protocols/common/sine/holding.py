@@ -1,4 +1,4 @@
-"""Hold of an unstable rocking motion: capture from the free motion, correction of the table, measurement, release."""
+"""Hold of an unstable rocking motion: capture of the free motion, correction of the table, measurement and release."""
 
 from collections import deque
 from collections.abc import Generator
@@ -34,25 +34,24 @@ from sim.shaker import Shaker
 from sim.steady import NoOrbit, Orbit
 
 PATIENCE = 200
-"""Number of cycles within which a motion must be captured; the same number is allowed for the correction of the table
-and the measurement.
+"""Number of cycles within which a motion must be captured; capture, correction of the table and measurement together
+may take twice as many.
 """
 
 SLOW = 0.985
-"""Modulus of the slowest Floquet multiplier on fixed ground above which a hold is prepared before the test."""
+"""Largest modulus of the Floquet multipliers on fixed ground above which a hold is prepared before the test."""
 
 UPDATES = 8
 """Largest number of corrections of the table while a motion is held."""
 
 RELEASED, GROWN = 120, 0.3
-"""Largest number of cycles observed after the release, and relative deviation of the peak drift from that of the orbit
-that ends the observation.
+"""Largest number of cycles observed after the release, and relative deviation of the peak drift from the orbit's at
+which the observation ends.
 """
 
 KICK, FADING = 0.003, 12
-"""Control in a single cycle after the measurement, relative to the amplitude, that starts the deviation; from noise
-alone it would take a hundred cycles to grow. Number of cycles after it in which the effects of the other multipliers
-decay.
+"""Control in a single cycle after the measurement, relative to the amplitude, which starts the deviation; and number of
+cycles after it in which the effects of the other multipliers decay.
 """
 
 
@@ -70,7 +69,7 @@ class HoldCycle(Event):
 
 def prepared(orbit: Orbit | None, shaker: Shaker | None, harmonics: int) -> StabiliserDesign | None:
     """Design of the stabiliser, computed in advance because the computation takes too long to be done while the table
-    is driven. None if there is no orbit on the table, or if no control stabilises it.
+    is driven. None if there is no orbit on the table, or if no stabiliser can be designed for it.
     """
     if orbit is None:
         return None

@@ -5,7 +5,7 @@ from math import tau
 from bench.events import Progress
 
 OVERHEAD = 30.0
-"""Duration of a test in addition to its cycles [s]: rest, start, ramps."""
+"""Typical duration of a test in addition to its cycles [s]: rest, start and ramps."""
 
 CYCLES = 220
 """Typical number of cycles of a test, including settling."""

@@ -27,7 +27,7 @@ class SineParameters(Parameters):
     calibration_level: float = quantity(
         0.5,
         "1",
-        "level of the drive calibration relative to the level of the test; below 1, so that the block stays at rest",
+        "level of the drive calibration relative to the level of the test; reduced if the block would not stay at rest",
         gt=0,
         lt=1,
     )
