@@ -53,7 +53,7 @@ def map_section(specimen: Specimen, amplitude_factor: float, measured: Sequence[
     found = " Circles are measured points with their α₂." if measured else ""
     description = "Surfaces and contour maps of alpha 1 and alpha 2 over frequency and stiffness ratio."
     parts.append(Picture(figure, f"Gain surfaces (a) and maps (b, c) of α₁ and α₂, predicted.{found}", description))
-    return Section("map", "Gain surface and map (as Fig. 4 of the paper)", parts)
+    return Section("map", "Gain surface and map (as in Fig. 4 of the paper)", parts)
 
 
 def _axis(low: float, high: float, step: float, places: Sequence[float], margin: float) -> tuple[float, ...]:

@@ -101,7 +101,7 @@ def _omitted(left_out: LeftOut) -> Table:
     return {
         "record": Column(np.array([record for record, _ in left_out], dtype=np.str_), "", "name of the record"),
         "beta": Column(np.array(betas), "1", "stiffness ratio of the coupling spring; NaN: bare frame"),
-        "reason": Column(np.array([*left_out.values()], dtype=np.str_), "", "limits that the combination would exceed"),
+        "reason": Column(np.array([*left_out.values()], dtype=np.str_), "", "reason why it is not played"),
     }
 
 

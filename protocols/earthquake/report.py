@@ -1,4 +1,6 @@
-"""Report on tests under earthquake records: gains (Fig. 8(a), 9(a)), motions (Fig. 7), drifts (Fig. 8(b), 9(b))."""
+"""Report on tests under earthquake records: gains (Figs. 8(a) and 9(a) of the paper), table motions (Fig. 7), and
+drifts (Figs. 8(b) and 9(b)).
+"""
 
 from bisect import bisect_left, bisect_right
 from collections.abc import Mapping, Sequence
@@ -66,7 +68,7 @@ def seismic_sections(campaign: Campaign) -> list[Section]:
     if remarks:
         parts += ["Remarks on single tests:", Listing(remarks)]
     parts += histories_parts(campaign)
-    return [Section("seismic", "Earthquake records (as Figs. 7 to 9 of the paper)", parts)]
+    return [Section("seismic", "Earthquake records (as in Figs. 7 to 9 of the paper)", parts)]
 
 
 def _gains(points: Sequence[Mapping[str, Any]]) -> Table:
@@ -169,7 +171,7 @@ def _conditions(points: Sequence[Mapping[str, Any]]) -> Table:
         ]
         for row in points
     ]
-    caption = "Tracking of the table: rms errors relative to the rms of the record, within the band, and the peaks"
+    caption = "Tracking of the table: errors relative to the record, within the band, and peaks of table and drift"
     return Table(caption, columns, rows)
 
 

@@ -2,8 +2,8 @@
 
 The bare and the coupled test share sensors and specimen, so each draw has one specimen, one scale of the table's
 sensors and one pair of lasers for both; noise is drawn separately. If the model holds, the measured gain is
-distributed as the product of the drawn predicted gain and the drawn error of the measured ratio of coupled to bare, as
-a factor (GUM Supplement 1).
+distributed as the product of the drawn predicted gain and the drawn error of the measured ratio of coupled to bare,
+expressed as a factor (GUM Supplement 1).
 
 A second set of draws, with an exactly known specimen, gives the uncertainty due to the bench alone. Contributions drawn
 one by one only show which one is the largest: where the response is chaotic, each one changes the gain as much as all
@@ -161,7 +161,7 @@ def _standing(gains: Array) -> Array:
 
 
 def _interval(stood: Array) -> tuple[float | None, float | None]:
-    """Central 95 % interval of the draws; None without draws."""
+    """Central 95 % interval of the draws; (None, None) without draws."""
     if not stood.size:
         return None, None
     low, high = np.quantile(stood, INTERVAL)

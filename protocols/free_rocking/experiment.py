@@ -1,4 +1,4 @@
-"""Free rocking on a bench: limits of laser and filters, forecast, prediction, result."""
+"""Free rocking on a bench: limits of laser and filters, forecast, prediction and result."""
 
 from collections.abc import Sequence
 from functools import cached_property

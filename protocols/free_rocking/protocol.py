@@ -44,7 +44,7 @@ class FreeRockingParameters(Parameters):
 class RockingPoint(Parameters):
     """Restitution, critical angle and frequency parameter of the block, from its motion and from its dimensions."""
 
-    part: str = quantity(..., "", "name of the tilt, or of all tilts")
+    part: str = quantity(..., "", f'name of the tilt, or "{ALL}"')
     tilt_rad: float | None = quantity(None, "rad", "tilt before the release, positive towards the frame")
     impacts: int = quantity(..., "1", "number of impacts used")
     r_exp: float = quantity(..., "1", "restitution, from the better of the two estimators")
@@ -79,7 +79,9 @@ class RockingPoint(Parameters):
         "push at the release, expressed as the relative change of the tilt that would have the same effect",
     )
     birge: float | None = quantity(
-        None, "1", "scatter of r_motion over the tilts, relative to the scatter expected from the uncertainties"
+        None,
+        "1",
+        "scatter of r_motion between tilts, relative to that expected from the uncertainties; absent for a single tilt",
     )
     uncertainty_parts: str = quantity("", "", "standard uncertainty of r_exp by contribution, as JSON")
     remarks: str = quantity("", "", "remarks on the tilt")

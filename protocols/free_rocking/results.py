@@ -69,7 +69,8 @@ def rocking_table(points: Sequence[RockingPoint]) -> str:
 
 
 def rocking_figure(points: Sequence[RockingPoint], tilts: Sequence[Tilt], found: Findings | None) -> "Figure":
-    """Figure of four panels: motion of the largest tilt, residual, impacts and uncertainties; empty without result."""
+    """Figure of four panels: motion of the largest tilt, residual, impacts and uncertainties; empty without a result.
+    """
     figure = new_figure(8.0, 11.0)
     motion, left, single, parts = figure.subplots(4, 1, height_ratios=(3, 1.5, 3, 1.6))
     for panel in (motion, left, single, parts):
@@ -201,9 +202,9 @@ def rocking_sections(campaign: Campaign) -> list[Section]:
     if remarks:
         parts += ["Remarks:", Listing(remarks)]
     if combined and (impacts := _recorded_impacts(campaign, tilts)):
-        caption = "Restitution of every impact from the largest angles before and after it (measured), with the mean"
+        caption = "Restitution of every impact from the largest angles before and after it, with the combined value"
         figure = _impacts_figure(impacts, combined["r_exp"], combined["r_th"])
-        parts.append(Picture(figure, f"{caption} and theory.", "Restitution against impact velocity."))
+        parts.append(Picture(figure, f"{caption} and the theoretical one.", "Restitution against impact velocity."))
     return [Section("free-rocking", "Free rocking of the block", parts)]
 
 

@@ -3,7 +3,7 @@ runs.
 
 1. The block is removed.
 2. For releases by hand, the table is locked, and storey 2 is displaced and released for each decay. For pulses, the
-   drive is increased from probe to probe, from a level too low to cause damage to the level for the requested drift.
+   drive is increased from probe to probe, from 0.02 V to the level for the requested drift or at a limit.
 3. Each decay is recorded, fitted and published; an unusable decay is repeated once.
 4. The result combines all decays.
 """
@@ -66,7 +66,7 @@ STILL_LOCKED = "THE TABLE IS STILL LOCKED: remove the clamp before the table is 
 
 class FreeVibration(Prepared[FreeVibrationParameters]):
     """Identification of the frame. Raises InvalidInput for a pulse or an initial displacement outside the limits of the
-    bench, or for mass uncertainties if the specimen file contains the masses.
+    bench, or for a mass uncertainty other than the default if the specimen file contains the masses.
     """
 
     def __init__(
@@ -168,7 +168,10 @@ def _check_pull(parameters: FreeVibrationParameters, configuration: BenchConfigu
         *(0.5 * SHARE * min(configuration.limits.laser_range, 1.0) * half for half in configuration.laser_half_ranges),
     )
     if not LEAST <= parameters.pull <= room:
-        allowed = f"it must be {LEAST:g} to {room:.3g} m, as limited by limits.drift and the lasers' ranges"
+        allowed = (
+            f"it must be {LEAST:g} to {room:.3g} m, as limited by limits.drift, limits.laser_range and the lasers' "
+            "measuring ranges"
+        )
         raise InvalidInput("pull", parameters.pull, allowed)
 
 

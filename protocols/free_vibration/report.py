@@ -25,7 +25,8 @@ _SIGNS = {"k1": ("k₁", "k1_n_m"), "k2": ("k₂", "k2_n_m"), "xi1": ("ξ₁", "
 
 @dataclass(frozen=True)
 class Course:
-    """Damping ratio of a mode in one decay against the drift amplitude in the mode [m]; expanded uncertainty."""
+    """Damping ratio of a mode in one decay against the drift amplitude in the mode [m], and its expanded uncertainty.
+    """
 
     amplitude: Sequence[float]
     damping: Sequence[float]
@@ -113,7 +114,8 @@ def _damping(points: list[dict[str, Any]]) -> Table:
         ]
         for row in points
     ]
-    return Table("Residual of the fit, and significance of the change of damping with amplitude (99 %)", columns, rows)
+    caption = "Peak drift, residual of the fit, and change of damping with amplitude (significant: 99 %)"
+    return Table(caption, columns, rows)
 
 
 def _damping_course(points: Rows) -> list[Part]:

@@ -29,7 +29,7 @@ _COLUMNS = (
     TextColumn("f2", "Hz"),
     TextColumn("drift", "mm"),
     TextColumn("residual", "um"),
-    TextColumn("xi1 over drift", "%/mm"),
+    TextColumn("slope of xi1", "%/mm"),
 )
 
 PARTS = {

@@ -45,8 +45,8 @@ class HarmonicCampaign(Prepared[HarmonicParameters]):
     """Harmonic campaign.
 
     Raises InvalidInput if the steady motions, which are quick to compute, exceed the stroke, the ranges of the lasers
-    or the limits of the bench. The error names the parameter to change. The forecast simulates the complete run,
-    including starts.
+    or a limit on displacement, velocity or acceleration, or if the settle limit is too short. The error names the
+    parameter to change. The forecast simulates all stages, including starts.
     """
 
     def __init__(
@@ -234,8 +234,8 @@ _COLUMNS = (
 
 
 def points_table(points: Sequence[PointLike]) -> str:
-    """Text table of harmonic points, at most 118 characters wide, followed by remarks. Absent values are "-"; "NO <" in
-    the last column marks a disagreement with the prediction.
+    """Text table of harmonic points, followed by remarks. Absent values are "-"; "NO <" in the last column marks a
+    disagreement with the prediction.
     """
     rows = plain(points)
     return "\n".join([text_table(_COLUMNS, map(_cells, rows)), *_remarks(rows)])

@@ -2,9 +2,9 @@
 
 1. Bare frame: calibrate the drive; then, at each frequency, hold the amplitude, wait for the steady state, and measure.
 2. Each spring: mount it, and calibrate the drive again at a level that leaves the block at rest; then, at each
-   frequency, try the planned starts until the motion becomes steady. If a start topples the block, the test is ended,
-   the block is set upright, and the next start is tried. If no start leads to a steady motion, the first motion without
-   a fall is reported.
+   frequency, try the planned starts until the motion is steady or held. If a start topples the block, the test is
+   ended, the block is set upright, and the next start is tried. If no start leads to a steady or held motion, the first
+   motion without a fall is reported.
 """
 
 from collections.abc import Generator, Mapping, Sequence
@@ -153,7 +153,7 @@ class HarmonicPlan:
     def _overturned(self, specimen: Specimen, omega: float, falls: int, chance: float) -> HarmonicPoint:
         bare = self._bare[omega].peak
         branch = self._target_branch(specimen, omega)
-        kind = "stable" if branch and branch.stable else "unstable"
+        kind = "not found" if branch is None else "stable" if branch.stable else "unstable"
         return HarmonicPoint(
             omega_rad_s=omega,
             beta=specimen.label or 0.0,

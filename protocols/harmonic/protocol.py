@@ -116,7 +116,7 @@ class HarmonicPoint(Parameters):
         None,
         "1",
         "measured modulus of the dominant Floquet multiplier of an unsteady motion, or of a held motion after its "
-        "release; below 1, the motion becomes periodic",
+        "release; below 1, deviations from the periodic motion decay",
     )
     multiplier_uncertainty: float | None = quantity(None, "1", "expanded uncertainty of the multiplier (k = 2)")
     multiplier_angle_rad: float | None = quantity(
@@ -127,8 +127,8 @@ class HarmonicPoint(Parameters):
     uncertainty_correlations: str = quantity(
         "",
         "",
-        "correlation between the errors of the coupled and the bare test, by contribution, as JSON; correlated errors "
-        "cancel in alpha_2",
+        "correlation between the errors of the coupled and the bare test, by contribution, as JSON; errors cancel in "
+        "alpha_2 as far as they are correlated",
     )
     degrees_of_freedom: float | None = quantity(
         None, "1", "effective degrees of freedom of the uncertainty of alpha_2 (GUM G.4); absent above 1000"
@@ -163,7 +163,7 @@ class HarmonicPoint(Parameters):
         "total harmonic distortion: rms of the table's harmonics 2 to 10 relative to the fundamental, coupled frame",
     )
     table_updates: int = quantity(
-        0, "1", "number of drive corrections until the table's motion met the tolerances, coupled frame"
+        0, "1", "number of drive corrections made to bring the table's motion within the tolerances, coupled frame"
     )
     starts_tried: int = quantity(0, "1", "number of starts tried")
     start_chance: float | None = quantity(

@@ -1,4 +1,4 @@
-"""Report sections on steady sine tests: gains, budgets, and spectra, map and cycles (Figs. 6, 4, 5 of the paper)."""
+"""Report sections on steady sine tests: gains and budgets; spectra, map and cycles (Figs. 6, 4 and 5 of the paper)."""
 
 from collections.abc import Mapping, Sequence
 from math import degrees
@@ -78,7 +78,7 @@ def _spectra_section(campaign: Campaign) -> Section | None:
         "Gain spectra: measured points with expanded uncertainty (k = 2), and the prediction made before the test.",
         "Gain of the peak drift (logarithmic) against frequency, one panel per stiffness ratio.",
     )
-    return Section("spectra", "Gain spectra (as Fig. 6 of the paper)", [picture])
+    return Section("spectra", "Gain spectra (as in Fig. 6 of the paper)", [picture])
 
 
 def _holds_section(campaign: Campaign) -> Section | None:
@@ -104,7 +104,7 @@ def _histories_section(campaign: Campaign) -> Section | None:
     points = [row for row in campaign.harmonic_points if row["drift_peak_m"] is not None]
     if not points:
         return None
-    return Section("histories", "Time histories (as Fig. 5 of the paper)", _histories(campaign, points))
+    return Section("histories", "Time histories (as in Fig. 5 of the paper)", _histories(campaign, points))
 
 
 def _histories(campaign: Campaign, points: Sequence[Mapping[str, Any]]) -> list[Part]:
@@ -229,8 +229,8 @@ def _conditions(points: Sequence[Mapping[str, Any]]) -> Table:
             ]
         )
     caption = (
-        "Conditions of the points. The scale errors of the lasers, and with them most of the uncertainty of the peaks, "
-        "cancel in α₂; the scale error of the accelerometer is common to both tests"
+        "Conditions of the points. The scale errors of the sensors are common to the coupled and the bare test; those "
+        "of the lasers cancel in α₂"
     )
     return Table(caption, columns, rows)
 

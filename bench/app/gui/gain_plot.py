@@ -1,6 +1,6 @@
 # pyright: reportUnknownMemberType=false, reportUnknownVariableType=false, reportUnknownArgumentType=false
 # pyright: reportMissingTypeStubs=false
-"""Plot of the gain over the frequency of a sine, or over the stiffness for earthquake records: predicted lines and
+"""Plot of the gain against the frequency of a sine, or against stiffness for earthquake records: predicted lines and
 measured points.
 """
 

@@ -124,7 +124,7 @@ class _Paper:
             "moves towards the block.",
             "Curves of drift, first storey displacement and rocking angle over three periods of the drive.",
         )
-        return Section("histories", "Time histories at A, B and C (as Fig. 5 of the paper)", [text, picture])
+        return Section("histories", "Time histories at A, B and C (as in Fig. 5 of the paper)", [text, picture])
 
     def spectra(self) -> Section:
         asked = SpectrumRequest(beta=SECTIONS, amplitude_factor=AMPLITUDE_FACTOR)
@@ -132,7 +132,7 @@ class _Paper:
         figure = gain_spectra([], {**columns, "omega": columns["omega_rad_s"]})
         return Section(
             "spectra",
-            "Gain spectra (as Fig. 6 of the paper)",
+            "Gain spectra (as in Fig. 6 of the paper)",
             [
                 "Sections S1, S2 and S3 of the map, with the stability of the motions. The paper's experiments are "
                 "not drawn because their values are not published.",
@@ -146,7 +146,7 @@ class _Paper:
 
     def records(self) -> Section:
         parts: list[Part] = [*_of_what(self._request.records), *record_pictures(self._request.records)]
-        return Section("records", "Records (as Fig. 7 of the paper)", parts)
+        return Section("records", "Records (as in Fig. 7 of the paper)", parts)
 
     def seismic(self) -> Section:
         peak = 1.2 * self._specimen.uplift_acceleration

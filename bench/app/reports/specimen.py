@@ -103,7 +103,7 @@ def modes_section(specimen: Specimen, betas: Sequence[float]) -> Section:
     note = " A divergent mode has negative stiffness: it grows exponentially and has no frequency." if divergent else ""
     return Section(
         "modes",
-        "Modes (as Fig. 3 of the paper)",
+        "Modes (as in Fig. 3 of the paper)",
         [
             "Modes of the bare frame and of the linearised coupled system, Eq. 12 to 14, without damping." + note,
             Table("Modes (predicted, from the specimen's nominal values; shapes scaled to u₁ = 1)", columns, rows),

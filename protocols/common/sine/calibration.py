@@ -45,11 +45,11 @@ def bare_calibration(
 def spring_calibration(
     specimen: Specimen, omegas: Sequence[float], starts: Sequence[Start], level: float, bare: DriveCalibration
 ) -> Generator[Step, Outcome, DriveCalibration]:
-    """Calibrate the drive of the coupled frame, with the block at rest, at `omegas` [rad/s] and all frequencies of the
-    `starts`, with table accelerations of at most `level` [m/s2], and end the test.
+    """Calibrate the drive of the coupled frame, with the block at rest, at `omegas` [rad/s] and on a grid over the
+    frequencies of the `starts`, with table accelerations of at most `level` [m/s2], and end the test.
 
-    Far above the frame's modes the block only adds mass, so the response of the `bare` frame is used there. It is also
-    used if the block falls during the calibration.
+    Above the highest of these frequencies, where the block mainly adds mass, the response of the `bare` frame is used.
+    It is used at all frequencies if the block falls during the calibration.
     """
     request = f"Set the block upright on its base and mount the spring of beta = {specimen.label:g}."
     yield OperatorAction(OperatorTask.MOUNT_SPRING, specimen, request)

@@ -1,4 +1,4 @@
-"""Boundaries of stability over the frequency: the orbits at their two sides, and the command."""
+"""Boundaries of stability against frequency: the orbits at their two sides, and the command."""
 
 import json
 from pathlib import Path

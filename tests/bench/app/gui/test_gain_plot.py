@@ -1,4 +1,4 @@
-"""Points fill up on the predicted lines: over the frequency under sines, over the stiffness under records."""
+"""Points fill up on the predicted lines: against frequency for sines, against stiffness for records."""
 
 from typing import Any
 
