@@ -17,8 +17,9 @@ from sim.table_orbit import TableOrbit, TablePeriod, corner, harmonics_of
 Array = NDArray[np.float64]
 
 TICKS, SUBSTEPS = 400, 1
-"""Number of intervals of constant drive per period, and Runge-Kutta steps in each. The greatest peak differs by at
-most 0.2 % from that with 600 intervals of two steps, less than between two parts of a motion that does not repeat.
+"""Number of intervals of constant drive per period, and Runge-Kutta steps in each. In the cases compared, the greatest
+peak differed by at most 0.2 % from that with 600 intervals of two steps, less than between two parts of a motion that
+does not repeat.
 """
 
 LONGEST_PERIOD = 24

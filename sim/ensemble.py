@@ -76,7 +76,7 @@ def simulate_many(
         )
         for i in range(runs)
     ]
-    # group runs of equal order in batches that occupy every processor and finish within a second
+    # group runs of equal order in batches that occupy every processor and take about a second at most
     alike: dict[int, list[int]] = {}
     for i, run in enumerate(prepared):
         alike.setdefault(run.order, []).append(i)
@@ -130,7 +130,9 @@ _Member = tuple[Orbit, Specimen]
 """A known orbit, and the specimen whose orbit is searched for from there."""
 
 CHUNK = 500
-"""Members integrated together: enough to share the overhead of a step, few enough to finish within a second."""
+"""Approximate number of members integrated together: large enough to share the overhead of a step, small enough for
+regular reports of the progress.
+"""
 
 
 def steady_gains(

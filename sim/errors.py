@@ -60,7 +60,7 @@ class RockbenchError(Exception):
 
 
 class InvalidInput(RockbenchError, ValueError):
-    """Error: a value was refused before anything started.
+    """Error: a value is refused.
 
     `item` names the key, flag or argument; `value` the input; `allowed` describes valid input.
     """

@@ -59,7 +59,7 @@ stiffnesses and masses.
 class SpecimenKnowledge(SpecimenUncertainty):
     """Uncertainty of a specimen: covariance of measured quantities (jointly normal), half widths of the others.
 
-    The methods expect specimens that have the measured values, see `Identified.applied`. `give` is an additional
+    The methods expect specimens that have the measured values (see `Identified.applied`). `give` is an additional
     relative half width of the restitution.
     """
 

@@ -22,7 +22,7 @@ STRIPS = 2
 """Number of strips of columns per processor: enough to balance the load, but few enough to keep each strip wide."""
 
 POINTS = 40_000
-"""Number of points of a block: about a second on two processors, and some 50 MB."""
+"""Approximate number of points of a block, which requires about 50 MB."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -28,7 +28,7 @@ WITHIN = 0.02
 """Largest relative difference between peaks and those of a steady motion at which this motion counts as reached."""
 
 WINDOW = 20
-"""Number of drive periods over which the peaks are taken: longer than the beats of a modulated motion."""
+"""Number of drive periods over which the peaks are taken."""
 
 LEFT = 1e-3
 """Fraction to which a disturbance of the stable orbit would decay while an undecided motion is continued."""
@@ -117,7 +117,8 @@ def reached(
     last = program.sweeps[-1]
     if last.omega != (omega, omega) or last.amplitude != (amplitude, amplitude) or last.duration < window:
         allowed = f"it must end with a dwell of at least {window:g} s at {omega:g} rad/s and {amplitude:g} m/s2"
-        raise InvalidInput("end of a start-up", last, allowed)
+        span = f"{last.omega[0]:g} to {last.omega[1]:g} rad/s, {last.amplitude[0]:g} to {last.amplitude[1]:g} m/s2"
+        raise InvalidInput("end of a start-up", f"{last.duration:g} s, {span}", allowed)
     steady = steady or _steady(specimen, omega, amplitude)
     phase = program.phase + sum(float(part.phase_at(np.array(part.duration))) for part in program.sweeps)
     # whole periods, so that each round begins at the phase with which the previous one ended

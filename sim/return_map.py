@@ -30,8 +30,8 @@ Accuracy = Literal[2, 4]
 """Order of the finite differences for a Jacobian, which take 12 or 24 evaluations of the map."""
 
 DIFFERENCE: dict[Accuracy, float] = {2: 4e-6, 4: 5e-5}
-"""Relative steps at which truncation and rounding contribute equally to the error of the multipliers, which is 5e-10
-and 5e-11.
+"""Relative steps at which truncation and rounding contribute about equally to the error of the multipliers, which is
+then about 5e-10 and 5e-11, respectively.
 """
 
 STENCIL: dict[Accuracy, tuple[Floats, Floats]] = {

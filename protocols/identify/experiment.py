@@ -44,7 +44,7 @@ class Identification(Prepared[IdentifyParameters]):
 
     @cached_property
     def forecast(self) -> Forecast:
-        """Demands of the strongest multisine, scaled from its plan, since all motions are linear."""
+        """Largest demands of the planned multisines."""
         self.progress("predicting the demands of the run")
         found = self._found
         where = f"a multisine with a peak of {found.level:.3g} m/s2"
@@ -146,7 +146,7 @@ def _response_figure(model: TableModel | None) -> "Figure":
     magnitude.set_ylabel("acceleration per drive\n[m/s²/V]")
     phase.set_ylabel("phase [°]")
     coherence.set_ylabel("1 − coherence [1]")
-    uncertain.set_ylabel("of the response\n[m/s²/V]")
+    uncertain.set_ylabel("response, errors\n[m/s²/V]")
     noise.set_ylabel("noise\n[m/s²/√Hz]")
     noise.set_xlabel("frequency [Hz]")
     for panel in panels:

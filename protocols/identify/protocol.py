@@ -28,8 +28,8 @@ PROTOCOL = Protocol(
     name="identify",
     summary="Identify the table: acceleration per volt of drive against frequency.",
     details=(
-        "Probes the unknown table, plays low-level multisines with random phases with the specimen on the "
-        "table, and separates response, noise and nonlinear distortion. The key `table_model` in the "
+        "Probes the unknown table, plays low-level random-phase multisines with the specimen on the table, "
+        "and separates response, noise and nonlinear distortion. The key `table_model` in the "
         "configuration of other runs names the result, table_model.json. Without options, a run identifies "
         "the table with the bare frame, over the band required to replicate records."
     ),

@@ -13,9 +13,9 @@ The order is chosen by cross-validation. It is the lowest order whose curves, fi
 omitted pass as well as the best order does, within one standard error. The uncertainty of the curve combines the
 scatter of the curves that omit each pass in turn (jackknife) and the contribution of higher orders.
 
-The lasers are the length standard, because the smooth linearity error on their data sheets, relative to the span of the
-passes, determines the scale better than the table's sensors. The table's sensors and each laser are therefore compared
-with the mean span of both lasers.
+The lasers are the length standard: the smooth linearity error on their data sheets, relative to the span of the passes,
+limits their scale error more closely than that of the table's sensors is known. The table's sensors and each laser are
+therefore compared with the mean span of both lasers.
 """
 
 from collections.abc import Sequence
@@ -43,8 +43,8 @@ READINGS = 201
 
 @dataclass(frozen=True, eq=False)
 class Pass:
-    """Mean cycle of a pass at `omega` [rad/s]: displacement [m] and speed [m/s] of the table, and both lasers [m],
-    shape (k,) each.
+    """Mean cycle of a pass at `omega` [rad/s]: displacement [m] and velocity [m/s] of the table, and readings of both
+    lasers relative to rest [m], shape (k,) each.
     """
 
     omega: float

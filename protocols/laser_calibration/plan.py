@@ -105,8 +105,8 @@ def measure(
 
 
 def _passes(parameters: LaserCalibrationParameters) -> Generator[Step, Outcome, list[Pass]]:
-    """Calibrate the drive in small steps, then drive the table and measure. Raises Unmeasurable if the response is
-    insufficient.
+    """Calibrate the drive at increasing levels, then drive the table and measure. Raises Unmeasurable if the response
+    is insufficient.
     """
     slow = 0.5 * parameters.omega
     yield Publish(StepStarted("calibrate the drive"))

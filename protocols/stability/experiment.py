@@ -115,7 +115,7 @@ class StabilityTest(Prepared[StabilityParameters]):
 
     @cached_property
     def prediction(self) -> Table:
-        """Predicted curve of the multiplier over frequency or amplitude, on fixed ground and on the table."""
+        """Predicted multiplier against frequency or amplitude, on fixed ground and on the table."""
         p, shaker = self.parameters, self.configuration.simulated_shaker
         uplift = self._specimen.uplift_acceleration
         places = self._curve()

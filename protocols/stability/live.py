@@ -1,4 +1,4 @@
-"""Live view of a stability test: multipliers in the complex plane, and their modulus over frequency or amplitude."""
+"""Live view of a stability test: multipliers in the complex plane, and their modulus against frequency or amplitude."""
 
 import numpy as np
 

@@ -146,7 +146,9 @@ class StabilityPlan:
     def _point(
         self, place: Place, starts: Sequence[Start], calibration: DriveCalibration
     ) -> Generator[Step, Outcome, StabilityPoint]:
-        """Try the starts until one yields a multiplier; returns its point, otherwise that of the last motion held."""
+        """Try the starts until one yields a multiplier; returns its point, otherwise the last point without a fall, or
+        an overturned point after falls only.
+        """
         p, configuration, specimen = self._parameters, self._configuration, self._specimen
         amplitude, shaker = place.factor * specimen.uplift_acceleration, configuration.simulated_shaker
         fields: dict[str, Any] = {"omega_rad_s": place.omega, "amplitude_factor": place.factor, "beta": p.beta}
@@ -154,7 +156,9 @@ class StabilityPlan:
         design = prepared(orbit, shaker, p.harmonics)
         if orbit is None or design is None:
             reason = (
-                "the model has no rocking orbit at this point" if orbit is None else "no control stabilises the orbit"
+                "the model has no rocking orbit at this point"
+                if orbit is None
+                else "no stabiliser can be designed for the orbit"
             )
             return StabilityPoint(**fields, status=OrbitStatus.NOT_HELD, reason=reason)
         found = predicted(orbit, configuration.known_on_table, shaker, p.harmonics)

@@ -125,7 +125,7 @@ def boundaries(places: Sequence[float], moduli: Sequence[float], uncertainties: 
         slope = (y[k + 1] - y[k]) / (x[k + 1] - x[k])
         share = (1.0 - y[k]) / (y[k + 1] - y[k])
         place = float(x[k] + share * (x[k + 1] - x[k]))
-        # the largest contribution, the scale of the accelerometer, is common to all points
+        # a scale error of the accelerometer is common to all points
         shifted = ((1.0 - share) * u[k] + share * u[k + 1]) / abs(slope)
         bent = 0.5 * abs(_bend(x, y, k, place)) / abs(slope)
         found.append(Boundary(place, COVERAGE * hypot(shifted, bent), float(x[k]), float(x[k + 1])))

@@ -49,7 +49,7 @@ def by_amplitude(points: Sequence[StabilityPoint]) -> bool:
 
 
 def measured_boundaries(points: Sequence[StabilityPoint]) -> list[Boundary]:
-    """Boundaries between the measured points, over frequency [rad/s] or amplitude factor."""
+    """Boundaries between the measured points: frequencies [rad/s] or amplitude factors."""
     over = by_amplitude(points)
     known = [point for point in points if point.modulus is not None]
     return boundaries(
@@ -125,8 +125,8 @@ def _cells(point: StabilityPoint) -> list[str]:
 
 
 def stability_figure(points: Sequence[StabilityPoint], curve: Curve) -> "Figure":
-    """Modulus over frequency or amplitude with the boundaries and their intervals, and the multipliers in the complex
-    plane; a filled marker is an unstable orbit.
+    """Modulus against frequency or amplitude, with the boundaries and their intervals, and the multipliers in the
+    complex plane; a filled marker is an unstable orbit.
     """
     figure = new_figure(9.0, 3.8)
     left, right = figure.subplots(1, 2, width_ratios=(1.5, 1.0))

@@ -22,7 +22,7 @@ if sys.platform != "win32":
     import pwd
 
 KEPT = 6
-"""Number of unused folders of other kernel versions that are kept, so that they need no recompilation."""
+"""Number of unused folders of other kernel versions that are kept, so that a return to them needs no recompilation."""
 
 PREFIX = "rockbench-"
 IN_USE = "in-use"
@@ -195,9 +195,10 @@ def _remove_unused(folder: Path) -> None:
 
 
 def _require_private(path: Path, *, parents: bool) -> None:
-    """Raise OSError if a user other than root could write to `path` or, with `parents`, to a folder above it.
+    """Raise OSError unless `path` is a folder that belongs to this user (or, with `parents`, to root), and to which, as
+    to the folders above it with `parents`, other users cannot write. Windows is not checked:
 
-    User folders of Windows are private by default.
+    its user folders are private by default.
     """
     if sys.platform == "win32":
         return

@@ -38,7 +38,7 @@ COLUMNS = 9
 
 _NONE, _IMPACT, _CATCH, _UPLIFT = 0, 1, 2, 3
 _REST_ANGLE = 1.0e-7
-"""A bounce that stays below this angle [rad] is replaced by rest; the error at the block's top is at most 4e-6 m."""
+"""A bounce that stays below this angle [rad] is replaced by rest."""
 _BOUNCES = 100
 """Number of events within one step after which the block is set to rest. Because of the rest angle, real motions have
 far fewer.
