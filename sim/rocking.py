@@ -1,4 +1,4 @@
-"""Motion of the specimen under a base acceleration: rest, rocking, impacts, overturning.
+"""Motion of the specimen under a base acceleration: rest, rocking, impacts and overturning.
 
 Front end to `sim.kernel.rocking` with named types and checks.
 """
@@ -22,7 +22,7 @@ REST_ANGLE = 1e-12
 """Angle of a bounce [rad] below which the block comes to rest; also the bound of the resulting error of the angle."""
 
 MOST_IMPACTS = 1_000_000
-"""Number of impacts after which a run fails; a sequence of decaying bounces has about five hundred."""
+"""Number of impacts after which a run fails; a decaying sequence of bounces of the default block has several hundred."""
 
 
 SMALLEST_PART, LARGEST_PART = 8, 64
@@ -128,7 +128,7 @@ def simulate(
     result, not an error. Samples and peaks do not affect the motion, and take time only when requested.
 
     Raises InvalidInput, before anything is integrated, for values outside their ranges. Source: Eq. (8), (9), (A.1) and
-    (A.3) of the paper; the condition in which the block comes to rest is given in `sim.kernel.rocking.run`.
+    (A.3) of the paper; the condition for the block to come to rest is given in `sim.kernel.rocking.run`.
     """
     check_options(tolerance, overturning_angle)
     run = RockingRun(
@@ -141,8 +141,8 @@ def series_order(tolerance: float, segment: float) -> int:
     """Order of the Taylor series that reaches `tolerance` at minimum cost; `segment` is the typical segment length [s].
 
     Long segments need 1.6 orders per digit (measured). Under a record, most steps end at a sample, so that a lower
-    order that just spans one interval is cheaper; the radius of convergence of the motion is about 0.27 s. The step
-    control meets the tolerance with any order.
+    order that just spans one interval is cheaper; the radius of convergence is about 0.27 s for the default specimen.
+    The step control meets the tolerance with any order.
     """
     longest = ceil(-1.6 * log10(tolerance))
     covering = 3 + ceil(log(tolerance) / log(min(segment, 0.2) / 0.27))

@@ -21,8 +21,8 @@ class Laser(Parameters):
     """Triangulation laser similar to the optoNCDT 1420, read at its analogue output. The reading at rest is mid range.
 
     The current is 4 mA at the start and 20 mA at the end of the measuring range, with a reserve of 1 % at both ends
-    (manual of the optoNCDT 1420 and of its family). The number of bits of the output and the error current are not
-    clearly documented and are therefore parameters.
+    (manuals of the optoNCDT 1420 and of related sensors). The number of bits of the output and the error current are
+    not clearly documented and are therefore parameters.
     """
 
     measuring_range: float = quantity(0.200, "m", "measuring range; the storey rests at mid range", gt=0)

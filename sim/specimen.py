@@ -14,7 +14,7 @@ from sim.errors import InvalidInput
 from sim.parameters import COUPLING, Parameters, quantity
 
 SLOWEST, FASTEST = 1e-3, 1e5
-"""Plausible natural frequencies [rad/s] of a frame on a shake table; others must be due to typing errors."""
+"""Plausible natural frequencies [rad/s] of a frame on a shake table; others are regarded as typing errors."""
 
 
 DAMPING = (0.001, 0.15)
@@ -44,7 +44,8 @@ class Frame(Parameters):
         except ArithmeticError:
             lower, upper = 0.0, 0.0
         if not (lower >= SLOWEST and upper <= FASTEST):
-            makes = f"with these masses and k2, a natural frequency is not between {SLOWEST:g} and {FASTEST:g} rad/s"
+            given = f"m1 = {self.m1:g} kg, m2 = {self.m2:g} kg and k2 = {self.k2:g} N/m"
+            makes = f"with {given}, a natural frequency is not between {SLOWEST:g} and {FASTEST:g} rad/s"
             raise InvalidInput("k1", self.k1, makes)
         return self
 

@@ -1,8 +1,8 @@
 """Steady response to a sine, as the solution of a boundary-value problem.
 
-There are two branches of periodic motion: the block rocks with two impacts per period of the drive, or it never lifts.
-Both motions can coexist. The rocking motion is a fixed point of the return map with the section "just after the impact
-into theta > 0". The map covers the full period, because the spring is on one side only, so that the model is not
+Two branches of periodic motion are computed: the block rocks with two impacts per period of the drive, or it never
+lifts. Both motions can coexist. The rocking motion is a fixed point of the return map with the section "just after the
+impact into theta > 0". The map covers the full period, because the spring is on one side only, so that the model is not
 symmetric in theta.
 """
 
@@ -155,8 +155,8 @@ def resting_state(specimen: Specimen, omega: float, amplitude: float) -> Orbit |
     """Steady motion in which the block never lifts, in closed form; None where it does not exist.
 
     It exists if and only if |h_b M A - k_C h1 U1| < b g M, where U1 is the complex amplitude of the frame whose spring
-    is attached to the resting block (Eq. 9 and A.3 over a whole period). It is always stable. Raises InvalidInput as
-    `rocking_orbit` does.
+    is attached to the resting block (Eq. 9 and A.3 over a whole period). It is stable if the frame is damped. Raises
+    InvalidInput as `rocking_orbit` does.
     """
     check_steady(specimen, omega, amplitude)
     if not amplitude < resting_level(specimen, omega):

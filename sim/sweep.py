@@ -52,7 +52,7 @@ def sweep(
 ) -> list[Result]:
     """Apply `function` to each item and return the results in order. Raises the first exception in `function`.
 
-    By default, the function runs in as many threads as there are processors, see `in_threads`. With the address of a
+    By default, the function runs in as many threads as there are processors (see `in_threads`). With the address of a
     dask `scheduler`, such as "tcp://10.0.0.5:8786", it runs in the workers of the scheduler, which need this package;
     function and items must be picklable. There, a task has `batch` items, and `done` counts tasks. Choose `batch` so
     that a task takes much longer than the few milliseconds of its transfer.

@@ -23,7 +23,9 @@ from sim.steady import NoOrbit, Orbit, slowest_of
 Array = NDArray[np.float64]
 
 TICKS, SUBSTEPS = 600, 2
-"""Number of intervals of constant drive per period, and Runge-Kutta steps in each; multipliers are accurate to 4e-5."""
+"""Number of intervals of constant drive per period, and Runge-Kutta steps in each; the error of the multipliers is then
+about 4e-5.
+"""
 
 STEP = 1e-5
 """Step of the finite differences, relative to the scale of each state."""
@@ -155,7 +157,7 @@ class TablePeriod:
         """Advance by one period. Returns the mode after it, and the samples, shape (ticks, 9).
 
         The last column of the samples is the mean acceleration in the tick that follows the sample. Updates the state
-        `y`, shape (8,), and `carried`, see `sim.kernel.table.stream`.
+        `y`, shape (8,), and `carried` (see `sim.kernel.table.stream`).
         """
         samples = np.empty((commands.size, 9))
         after = self._stream(

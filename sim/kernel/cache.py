@@ -195,10 +195,10 @@ def _remove_unused(folder: Path) -> None:
 
 
 def _require_private(path: Path, *, parents: bool) -> None:
-    """Raise OSError unless `path` is a folder that belongs to this user (or, with `parents`, to root), and to which, as
-    to the folders above it with `parents`, other users cannot write. Windows is not checked:
+    """Raise OSError unless `path` is a folder that belongs to this user or, with `parents`, to root; also if other
+    users can write to it or, with `parents`, to a folder above it.
 
-    its user folders are private by default.
+    Nothing is checked on Windows, whose user folders are private by default.
     """
     if sys.platform == "win32":
         return
