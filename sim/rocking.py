@@ -22,7 +22,7 @@ REST_ANGLE = 1e-12
 """Angle of a bounce [rad] below which the block comes to rest; also the bound of the resulting error of the angle."""
 
 MOST_IMPACTS = 1_000_000
-"""Number of impacts after which a run fails; a decaying sequence of bounces of the default block has several hundred."""
+"""Number of impacts after which a run fails; decaying bounces of the default block have several hundred."""
 
 
 SMALLEST_PART, LARGEST_PART = 8, 64

@@ -135,8 +135,7 @@ class SensorTrack:
         self._asked = 0.0
 
     def begin(self) -> None:
-        """Begin a run: reset the numbers of values, lost values and so on, but keep the history of the sensor's clock.
-        """
+        """Begin a run: reset the counts of values and faults, but keep the history of the sensor's clock."""
         self._course = Course()
         self._mark = None
         self._values = self._lost = self._late = 0

@@ -101,8 +101,7 @@ def alignment_lines(alignments: Sequence[Alignment], configuration: BenchConfigu
 
 
 def drive_lines(sines: Sines, parameters: CheckParameters, configuration: BenchConfiguration) -> Iterator[CheckLine]:
-    """Lines for the dead time and for the drive at each frequency, the latter with limits if the shaker is simulated.
-    """
+    """Lines for the dead time and for the drive at each frequency, which has limits if the shaker is simulated."""
     yield judged(
         "drive",
         "dead time to table_acceleration",
@@ -171,8 +170,7 @@ def _noise(channel: Channel, counts: Counts, limit: float | None) -> CheckLine:
 
 
 def _reason(channel: Channel, invalid: Counts) -> str:
-    """Cause of invalid samples, inferred from the most frequent invalid count, with a remedy; empty if all are valid.
-    """
+    """Cause of invalid samples, from the most frequent invalid count, with a remedy; empty if all are valid."""
     if invalid.size == 0:
         return ""
     values, numbers = np.unique(invalid, return_counts=True)

@@ -25,8 +25,7 @@ _SIGNS = {"k1": ("k₁", "k1_n_m"), "k2": ("k₂", "k2_n_m"), "xi1": ("ξ₁", "
 
 @dataclass(frozen=True)
 class Course:
-    """Damping ratio of a mode in one decay against the drift amplitude in the mode [m], and its expanded uncertainty.
-    """
+    """Damping ratio of a mode in one decay, with expanded uncertainty, against the drift amplitude in the mode [m]."""
 
     amplitude: Sequence[float]
     damping: Sequence[float]

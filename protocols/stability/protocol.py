@@ -36,8 +36,7 @@ class StabilityPoints(Parameters):
 
 
 class StabilityParameters(SineParameters, StabilityPoints):
-    """Orbits with one spring at several frequencies or amplitudes, held and then released to measure their multipliers.
-    """
+    """Orbits with one spring at several frequencies or amplitudes, held and released to measure their multipliers."""
 
     settle_limit: float = quantity(30.0, "s", "longest wait for the steady state before the hold", gt=0, le=3600)
     released_cycles: int = quantity(60, "1", "largest number of cycles observed after the release", ge=24, le=1000)
