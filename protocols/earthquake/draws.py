@@ -104,7 +104,7 @@ class _Runs:
         return self._bare.run(specimen.bare(), acceleration, tolerance=TOLERANCE).peaks
 
     def gains(self, specimen: Specimen, acceleration: Array, bare: Callable[[], Peaks]) -> tuple[float, float, float]:
-        """alpha_1, alpha_2 and the time of overturning [s]: the gains are NaN if the block topples, else the time is."""
+        """alpha_1, alpha_2 and the time of overturning [s]: the gains are NaN if the block topples, else the time."""
         moved = self._coupled.run(specimen, acceleration, tolerance=TOLERANCE, overturning_angle=CATCH_ANGLE)
         if moved.status is not Status.COMPLETED:
             return nan, nan, moved.end_time

@@ -44,7 +44,7 @@ class FreeRockingParameters(Parameters):
 class RockingPoint(Parameters):
     """Restitution, critical angle and frequency parameter of the block, from its motion and from its dimensions."""
 
-    part: str = quantity(..., "", f'name of the tilt, or "{ALL}"')
+    part: str = quantity(..., "", 'name of the tilt, or "all tilts"')
     tilt_rad: float | None = quantity(None, "rad", "tilt before the release, positive towards the frame")
     impacts: int = quantity(..., "1", "number of impacts used")
     r_exp: float = quantity(..., "1", "restitution, from the better of the two estimators")

@@ -69,7 +69,7 @@ def rocking_table(points: Sequence[RockingPoint]) -> str:
 
 
 def rocking_figure(points: Sequence[RockingPoint], tilts: Sequence[Tilt], found: Findings | None) -> "Figure":
-    """Figure of motion and residual of the largest tilt, of all impacts, and of uncertainties; empty without a result."""
+    """Figure of motion and residual of the largest tilt, all impacts, and uncertainties; empty without a result."""
     figure = new_figure(8.0, 11.0)
     motion, left, single, parts = figure.subplots(4, 1, height_ratios=(3, 1.5, 3, 1.6))
     for panel in (motion, left, single, parts):

@@ -113,8 +113,9 @@ def _damping(points: list[dict[str, Any]]) -> Table:
         ]
         for row in points
     ]
-    caption = "Peak drift, residual of the fit, and change of damping with amplitude (significant: 99 %)"
-    return Table(caption, columns, rows)
+    return Table(
+        "Peak drift, residual of the fit, and change of damping with amplitude (significant: 99 %)", columns, rows
+    )
 
 
 def _damping_course(points: Rows) -> list[Part]:
