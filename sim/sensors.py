@@ -1,4 +1,4 @@
-"""Models of the instruments from motion to counts: lasers, accelerometer, displacement sensor, converter.
+"""Models of the instruments from motion to counts: lasers, accelerometer, displacement sensor and converter.
 
 Each instrument is a group of parameters. The method `stream` starts a laser, which has internal state; the other models
 are functions of the samples. The results do not depend on how the ticks are divided into blocks, if every instrument

@@ -1,4 +1,4 @@
-"""Long-stroke electrodynamic shaker: moving mass on a soft suspension, moving coil, power amplifier.
+"""Long-stroke electrodynamic shaker: moving mass on a soft suspension, moving coil and power amplifier.
 
     m x'' = Bl i - k_s x - c_s v - F_c tanh(v / v_c) - end stops + force noise - reaction of the specimen
 

@@ -89,7 +89,7 @@ def table_delay_lines(
     storeys = dict(zip(STOREYS, (sines.storey_1, sines.storey_2), strict=True)) if lasers else {}
     against = {name: _delay_between(sines.omega, sines.accelerometer, seen) for name, seen in storeys.items()}
     middle = float(np.mean([one.delay for one in against.values()])) if against else np.nan
-    # the lasers lag behind the correct sensor by their latency, the smaller of the two differences
+    # the lasers lag behind the correct sensor only by their latency, so the sensor nearer to them is assumed correct
     alone = TABLE_ACCELERATION if abs(middle + pair.delay) < abs(middle) else TABLE_DISPLACEMENT
     odd = f"{alone} differs from the lasers: " if lasers else ""
     yield judged(
@@ -147,8 +147,8 @@ def scale_lines(sines: Sines, parameters: CheckParameters, *, lasers: bool) -> I
             abs(scale),
             allowed,
             "1",
-            "the drift is their difference: check the measuring range and the load resistor of the laser with "
-            "the wrong scale",
+            "the drift is the difference between the lasers: check the measuring range and, on the analogue "
+            "output, the load resistor of the laser with the wrong scale",
             expected=1.0,
             uncertainty=COVERAGE * uncertainty,
         )

@@ -19,7 +19,7 @@ from protocols.check.protocol import CheckParameters
 from sim.channel import STOREYS, TABLE_ACCELERATION, TABLE_DISPLACEMENT
 
 _STUCK = 0.01
-"""Standard deviation [counts] below which a channel is considered stuck, about that of one sample in ten thousand that
+"""Standard deviation [counts] below which a channel is considered stuck; 0.01 results if one sample in ten thousand
 differs by one count.
 """
 

@@ -50,7 +50,7 @@ class CheckParameters(Parameters):
         0.01, "1", "largest allowed relative error of the first storey's drift due to a laser's delay", gt=0, lt=0.5
     )
     highest_omega: float = quantity(
-        20.0, "rad/s", "highest frequency of later tests, where a delay has the largest effect", gt=0, le=60
+        20.0, "rad/s", "highest circular frequency of later tests, where a delay has the largest effect", gt=0, le=60
     )
 
 
@@ -85,7 +85,7 @@ def number(value: float | None, digits: int = 4) -> str:
 
 PROTOCOL = Protocol(
     name="check",
-    summary="Check the loop of the configured bench at low level, and give a remedy for each check that fails.",
+    summary="Check the loop of the configured bench at low amplitude, and give a remedy for each check that fails.",
     details=(
         "Records every channel at rest, then drives sines of equal velocity with the frame locked to the "
         "table, and checks the drive and the polarity, scale and delay of the table's sensors and of lasers on the "

@@ -1,4 +1,4 @@
-"""Probe and calibration of the drive with sines that leave the block at rest, and checks of the measured cycles."""
+"""Probe and calibration of the drive with sines, and checks of the measured cycles."""
 
 from collections.abc import Generator, Sequence
 from math import ceil, log2

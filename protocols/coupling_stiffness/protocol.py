@@ -23,7 +23,7 @@ class CouplingStiffnessParameters(DecayParameters):
     reference: bool = quantity(
         True,
         "",
-        "whether the bare frame is measured first, so that common errors cancel; otherwise the previously "
+        "whether the bare frame is measured first, so that errors common to both cancel; otherwise the previously "
         "identified k1 is used",
     )
 

@@ -1,4 +1,4 @@
-"""Measured and predicted response to one played record: table motion, peaks, overturning, running gain, histories."""
+"""Measured and predicted response to one played record: table motion, peaks, overturning, running gain and histories."""
 
 from dataclasses import dataclass, field
 from math import nan
@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 QUIET = 0.5
 """Fraction of the rest before a record that is used to determine the noise; in the remainder, the zero-phase filters
-of the record already ring.
+already respond to the record.
 """
 
 

@@ -3,7 +3,7 @@ runs.
 
 1. The block is removed.
 2. For releases by hand, the table is locked, and storey 2 is displaced and released for each decay. For pulses, the
-   drive is increased from probe to probe, from 0.02 V to the level for the requested drift or at a limit.
+   drive is increased from probe to probe, from 0.02 V to the level that gives the requested drift or reaches a limit.
 3. Each decay is recorded, fitted and published; an unusable decay is repeated once.
 4. The result combines all decays.
 """

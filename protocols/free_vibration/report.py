@@ -126,7 +126,10 @@ def _damping_course(points: Rows) -> list[Part]:
         return []
     modes = [[_course(row[f"damping{mode}_course"]) for row in told] for mode in (1, 2)]
     figure = _damping_figure(modes, [together[-1]["xi1"], together[-1]["xi2"]])
-    caption = "Damping ratios in five windows of every decay against the drift amplitude in the mode."
+    caption = (
+        "Damping ratios in five windows of every decay against the drift amplitude in the mode, and the combined "
+        "values (lines)."
+    )
     return [Picture(figure, caption, "Damping ratio against amplitude for both modes, with the combined value.")]
 
 

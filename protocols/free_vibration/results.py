@@ -1,5 +1,5 @@
 # pyright: reportUnknownMemberType=false
-"""Results as a text table, and as a figure: decay, residual, spectrum, uncertainties, damping against amplitude."""
+"""Results as a text table, and as a figure: decay, residual, spectrum, uncertainties and damping against amplitude."""
 
 from collections.abc import Sequence
 from math import tau
@@ -93,7 +93,7 @@ def _notes(point: DecayPoint, result: FrameResult) -> list[str]:
     damping = (
         "The damping does not depend significantly on the amplitude."
         if point.damping_is_linear
-        else "The damping depends on the amplitude: see the figure; the value given is the mean over the decays."
+        else "The damping depends on the amplitude: see the figure. The stated ratios are means over the decays."
     )
     # the largest contribution to each quantity of the combined result
     largest = {

@@ -250,7 +250,7 @@ def _described(settled: Settled) -> str:
 
 
 def _growth(fixed: float, on_table: float | None) -> str:
-    """Growth or decay of disturbances, from the moduli of the slowest multipliers on fixed ground and on the table."""
+    """Growth or decay of disturbances, from the moduli of the dominant multipliers on fixed ground and on the table."""
 
     def change(modulus: float) -> str:
         return f"{'grow' if modulus > 1.0 else 'decay'} by {100.0 * abs(modulus - 1.0):.2g} % per cycle"

@@ -153,7 +153,8 @@ class HarmonicPlan:
     def _overturned(self, specimen: Specimen, omega: float, falls: int, chance: float) -> HarmonicPoint:
         bare = self._bare[omega].peak
         branch = self._target_branch(specimen, omega)
-        kind = "not found" if branch is None else "stable" if branch.stable else "unstable"
+        orbit = "no rocking orbit is predicted" if branch is None else "the predicted orbit is "
+        orbit += "" if branch is None else "stable" if branch.stable else "unstable"
         return HarmonicPoint(
             omega_rad_s=omega,
             beta=specimen.label or 0.0,
@@ -163,7 +164,7 @@ class HarmonicPlan:
             bare_amplitude_m_s2=bare.amplitude,
             starts_tried=falls,
             start_chance=chance,
-            reason=f"the block fell after every start ({falls} tried); the predicted orbit is {kind}",
+            reason=f"the block fell after every start ({falls} tried); {orbit}",
         )
 
     def _target_branch(self, specimen: Specimen, omega: float) -> Branch | None:

@@ -13,9 +13,9 @@ The order is chosen by cross-validation. It is the lowest order whose curves, fi
 omitted pass as well as the best order does, within one standard error. The uncertainty of the curve combines the
 scatter of the curves that omit each pass in turn (jackknife) and the contribution of higher orders.
 
-The lasers are the length standard: the smooth linearity error on their data sheets, relative to the span of the passes,
-limits their scale error more closely than that of the table's sensors is known. The table's sensors and each laser are
-therefore compared with the mean span of both lasers.
+The lasers are the length standard: their scale error over the span of the passes follows from the smooth linearity
+error on their data sheets, which is assumed to be smaller than the scale error of the table's sensors. The table's
+sensors and each laser are therefore compared with the mean span of both lasers.
 """
 
 from collections.abc import Sequence

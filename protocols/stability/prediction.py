@@ -65,7 +65,7 @@ def close_pair(orbit: Orbit) -> str:
 
 
 def on_table(orbit: Orbit, shaker: Shaker | None, harmonics: int) -> complex | None:
-    """Slowest multiplier on the table of `shaker`; None without a shaker or an orbit on its table."""
+    """Dominant multiplier on the table of `shaker`; None without a shaker or an orbit on its table."""
     if shaker is None:
         return None
     try:
@@ -88,7 +88,7 @@ def predicted(orbit: Orbit, known: SpecimenKnowledge, shaker: Shaker | None, har
 
 
 def _slowest(specimen: Specimen, orbit: Orbit, factor: float = 1.0) -> complex:
-    """Slowest multiplier on fixed ground of `specimen` at the frequency of `orbit` and `factor` times its amplitude."""
+    """Dominant multiplier on fixed ground of `specimen` at the frequency of `orbit` and `factor` times its amplitude."""
     try:
         return rocking_orbit(specimen, orbit.omega, factor * orbit.amplitude, guess=orbit).slowest
     except NoOrbit:

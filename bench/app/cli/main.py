@@ -34,7 +34,7 @@ GROUPS = {
 COMMANDS = {
     "check": (
         "run:check",
-        "Check the loop of the configured bench at low level, and give a remedy for each check that fails.",
+        "Check the loop of the configured bench at low amplitude, and give a remedy for each check that fails.",
         "",
     ),
     "queue": (

@@ -25,7 +25,7 @@ class FrameResult:
     """Result of one or several decays.
 
     `frame` contains the eight combined quantities, `slopes` the combined changes of the damping ratios with amplitude
-    [1/m]. `masses` [kg] are the weighed masses; `masses_covariance` [kg2], shape (2, 2), is their covariance.
+    [1/m]. `masses` [kg] are those of the storeys; `masses_covariance` [kg2], shape (2, 2), is their covariance.
     `mass_shift`, shape (8, 2), is the sensitivity of the quantities to the masses; `time_shift`, shape (8,), is their
     sensitivity to the timebase, multiplied by the timebase's standard uncertainty. `parts` holds the standard
     uncertainties of the quantities, shape (8,), by contribution.
@@ -71,7 +71,7 @@ class FrameResult:
 
 
 def frame_result(decays: Sequence[Decay], masses: tuple[float, float], masses_covariance: Array) -> FrameResult:
-    """Combined result of the decays of one frame with the weighed `masses` [kg]."""
+    """Combined result of the decays of one frame with the storey masses `masses` [kg]."""
     frame = combine(
         [one.quantities for one in decays],
         [one.uncertainty.own for one in decays],
@@ -168,4 +168,4 @@ def nonlinear_text(result: FrameResult) -> str:
         for mode, (slope, uncertainty) in enumerate(zip(result.slopes.values, result.slope_uncertainty, strict=True))
         if result.nonlinear[mode]
     ]
-    return f"the damping depends on the amplitude: {', '.join(slopes)}; the stated value is its mean over the decays"
+    return f"the damping depends on the amplitude: {', '.join(slopes)}; the stated ratios are means over the decays"

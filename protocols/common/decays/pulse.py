@@ -104,7 +104,7 @@ def decay_window(parameters: DecayParameters, specimen: Specimen) -> float:
 
 @dataclass(frozen=True, eq=False)
 class PlannedPulse:
-    """A pulse, its expected peak `drift` [m], and its demands, by the keys of `bench.preflight.margins`.
+    """A pulse, its expected peak `drift` [m], and its demands, keyed by the limited quantity.
 
     Unknown demands are absent. `binds` names the limit that determines the drift, or is "requested drift".
     """

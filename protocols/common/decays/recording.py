@@ -171,7 +171,7 @@ PointMaker = Callable[[FrameResult, int], Parameters]
 """Creates the point of a result from the result and the number of the decay, 0 for all decays together."""
 
 PROBES = 3
-"""Number of probes that most tables need, used for the expected duration."""
+"""Typical number of probes, used for the expected duration."""
 
 _TRIES = 2
 """Maximum number of attempts at a decay."""

@@ -162,7 +162,7 @@ def _answer(moved: Complex) -> tuple[float, float]:
 
     The response is the root sum of squares, over the lines, of the mean amplitudes of the periods; the noise is the
     root sum of squares of the standard errors of these means, estimated from the scatter between periods. If the table
-    does not respond, the two differ only randomly, and the difference decreases with the number of lines.
+    does not respond, the two differ only randomly, and their relative difference decreases with the number of lines.
     """
     periods, mean = moved.shape[0], moved.mean(axis=0)
     noise = np.sum(np.abs(moved - mean) ** 2) / (periods * (periods - 1))
@@ -176,7 +176,7 @@ def _peak(spectrum: Complex, grid: Grid) -> float:
 Array = NDArray[np.float64]
 
 PROBES = 3
-"""Number of probes that most tables need, used for the expected duration."""
+"""Typical number of probes, used for the expected duration."""
 
 SENSORS_AGREE = 0.05
 """Relative difference of the table's two sensors, or phase difference [rad] at the lower end of the band, above which a
