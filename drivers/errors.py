@@ -43,7 +43,7 @@ class ConnectionLost(RigError):
 
 
 class DeviceNotFound(RigError):
-    """A device, its driver or its port is missing or held by another program."""
+    """A device, its driver or its port is missing, unsuitable, or held by another program."""
 
     error_code = "device_not_found"
 

@@ -20,7 +20,7 @@ from sim.specimen import Specimen
 from sim.virtual_bench import VirtualBenchParameters
 
 LATE = 0.05
-"""Delay of the emulated lasers [s] beyond which their values are too late for a client with the default lead."""
+"""Delay in sending the values of an emulated laser [s] above which `Laboratory.late` reports it."""
 
 
 @dataclass(frozen=True)

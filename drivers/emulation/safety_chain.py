@@ -1,8 +1,8 @@
 """Enable chain of the amplifier and its monitoring contacts.
 
-In series: enable relay, heartbeat relay, emergency stop, over-travel switches; then the amplifier, which may have
-tripped. Second contacts of the emergency stop and of the switches, and the amplifier's ready contact, are wired to
-digital inputs of the DAQ device.
+In series: enable relay, heartbeat relay, emergency stop, over-travel switches, and the amplifier's own trip. Second
+contacts of the emergency stop and of the switches, and the amplifier's ready contact, are wired to digital inputs of
+the DAQ device.
 """
 
 import time
@@ -129,7 +129,7 @@ class SafetyChain:
         self._change(lambda: setattr(self, "_tripped", False))
 
     def break_wire(self, name: str) -> None:
-        """Break the wire of an input, which then reads low, or of the "heartbeat", whose relay then opens."""
+        """Break the wire of an input, which then reads low, or of the "heartbeat", whose relay then times out."""
         if name not in (*INPUTS, "heartbeat"):
             raise RigError(f"wire {name!r} is refused: the wires are {', '.join(INPUTS)} and heartbeat")
         self._change(lambda: self._broken.add(name))

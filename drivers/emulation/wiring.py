@@ -38,8 +38,8 @@ class Site:
     """Devices of a laboratory and the terminals in use.
 
     `inputs` are the terminals of displacement, acceleration and lasers; `contacts` are the digital inputs in the order
-    of `safety_chain.INPUTS`, empty on a device without digital inputs. `counter` switches the lasers; None if there is
-    none. `range` is the largest voltage that all inputs can measure [V].
+    of `safety_chain.INPUTS`, empty on a device without digital inputs. `counter` is the counter that switches the
+    lasers, None if there is none. `range` is the largest voltage that all inputs can measure [V].
     """
 
     devices: tuple[DeviceModel, ...]

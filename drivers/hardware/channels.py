@@ -85,7 +85,7 @@ class Scaling(Protocol):
 def analogue_channels(
     hardware: Hardware, scalings: Sequence[Scaling], devices: Mapping[str, str], further: Sequence[FurtherChannel] = ()
 ) -> tuple[Channel, ...]:
-    """The channels of the DAQ's inputs, in order: transducers, lasers on their analogue outputs, additional sensors.
+    """The channels of the DAQ's inputs in order: transducers, lasers on their analogue outputs, and additional sensors.
 
     `devices` is the DAQ's description, which contains the identity of each device.
     """
@@ -131,7 +131,7 @@ def _analogue(
     c0, c1, *higher = scaling.coefficients
     valid = scaling.lowest, scaling.highest
     if volts is not None:
-        # the polynomial is linear to within 0.1 %, which is sufficient for the limits of the sensor's reserve
+        # the converter's polynomial is assumed linear, which is sufficient for the limits of the sensor's reserve
         ends = sorted(round((end - c0) / c1) for end in volts)
         valid = max(valid[0], ends[0]), min(valid[1], ends[1])
     terms = tuple(c * slope for c in higher)

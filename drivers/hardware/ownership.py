@@ -20,7 +20,7 @@ from drivers.hardware.parameters import Hardware
 from sim.process_lock import LockHeld, ProcessLock
 
 FOLDER = "ROCKBENCH_LOCKS"
-"""Environment variable with the folder of the locks; the default folder is shared by all users of this machine."""
+"""Environment variable that sets the folder of the locks; all users of this machine share the default folder."""
 
 
 def devices_of(hardware: Hardware) -> list[str]:

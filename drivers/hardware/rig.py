@@ -27,11 +27,11 @@ from drivers.timebase.deskew import Deskew
 from drivers.timebase.marking import Pulses, golden_pulses
 
 _SETTLING = 0.05
-"""Time between the last pulse and the first sample of a run [s]."""
+"""Shortest time between the end of the pulses and the first sample of a run [s]."""
 _CHUNK = 0.1
 """Longest read during the pulses [s]; short, because each read also serves the watchdog and the heartbeat relay."""
 _FIRST_READINGS = 20
-"""Number of readings of the sample clock directly after its start; the first block needs bounds at once."""
+"""Number of readings of the sample clock directly after its start, when there are no earlier ones."""
 
 _GOLDEN = 0.6180339887498949
 """Phase step between consecutive readings [sample periods]; its multiples modulo 1 cover a period almost evenly."""

@@ -30,7 +30,7 @@ class SensorInfo:
 
     @property
     def supported(self) -> bool:
-        """True for sensors whose commands and scaling this driver supports."""
+        """Whether this driver supports the sensor's commands and scaling."""
         return re.match(r"ILD\s?1420\b", self.model, re.IGNORECASE) is not None
 
     @property

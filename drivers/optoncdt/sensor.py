@@ -21,7 +21,7 @@ _FIXED = ("AVERAGE NONE", "TRIGGER NONE", "OUTHOLD NONE", "OUTREDUCEDEVICE NONE"
 def require_sensor(
     name: str, who: str, info: SensorInfo, measuring_range: float, serial_number: str | None = None
 ) -> None:
-    """Raise DeviceNotFound for a model that is not supported, InvalidInput if the measuring range [m] or the serial
+    """Raise DeviceNotFound for a model that is not supported, or InvalidInput if the measuring range [m] or the serial
     number is not as configured.
     """
     if not info.supported:

@@ -110,9 +110,9 @@ _SENSOR_TOLERANCE = 100e-6
 class SensorClock:
     """Estimator of a sensor's clock: time t on it is `offset + rate * t` on the machine's clock [s].
 
-    The line is the earliest one consistent with the arrivals, so `offset` includes the smallest transfer delay. To
-    track changes, the older half of a history that no single line fits is discarded. `offset`, `rate` and `residual`
-    are NaN before the first reading.
+    The line is a lower bound of the arrivals, so `offset` includes the smallest transfer delay. To track changes, the
+    older half of a history that no single line fits is discarded. `offset`, `rate` and `residual` are NaN before the
+    first reading.
     """
 
     def __init__(self) -> None:

@@ -174,7 +174,7 @@ def typical(above: NDArray[np.float64]) -> float:
 
 
 def bends(points: Points, slope: float, tolerance: float) -> bool:
-    """Whether the points deviate from a line of this slope by more than `tolerance` [s] and random scatter, as after a
+    """Whether the points deviate from a line of this slope by more than `tolerance` [s] plus random scatter, as after a
     change of the rate.
 
     Compares the smallest delay in each of the last three quarters of the history. The first quarter is ignored, since

@@ -1,4 +1,4 @@
-"""Measured and predicted response to one played record: table motion, peaks, overturning, running gain and histories."""
+"""Measured and predicted response to a played record: table motion, peaks, overturning, running gain and histories."""
 
 from dataclasses import dataclass, field
 from math import nan

@@ -88,7 +88,9 @@ def predicted(orbit: Orbit, known: SpecimenKnowledge, shaker: Shaker | None, har
 
 
 def _slowest(specimen: Specimen, orbit: Orbit, factor: float = 1.0) -> complex:
-    """Dominant multiplier on fixed ground of `specimen` at the frequency of `orbit` and `factor` times its amplitude."""
+    """Dominant multiplier of `specimen` on fixed ground, at the frequency of `orbit` and `factor` times its amplitude.
+    It is NaN if no orbit is found.
+    """
     try:
         return rocking_orbit(specimen, orbit.omega, factor * orbit.amplitude, guess=orbit).slowest
     except NoOrbit:

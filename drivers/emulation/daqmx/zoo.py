@@ -110,7 +110,7 @@ def _cdaq(product: str, watchdog: float | None = None) -> DeviceModel:
 
 
 def _crio(product: str) -> DeviceModel:
-    """A CompactRIO controller; it has no watchdog, since the NI-DAQmx help lists none for CompactRIO."""
+    """A CompactRIO controller, without a watchdog: the NI-DAQmx help lists none for CompactRIO."""
     return DeviceModel("cRIO1", product, _CRIO, input_engines=_CRIO_INPUTS, output_engines=_CRIO_OUTPUTS)
 
 

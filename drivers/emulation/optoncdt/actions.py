@@ -1,4 +1,4 @@
-"""Commands that are not settings: queries, reset, storage, mastering (manual of the optoNCDT 1420, pp. 97 to 108)."""
+"""Commands that are not settings: queries, reset, storage and mastering (manual of the optoNCDT 1420, p. 97 to 108)."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace

@@ -65,7 +65,7 @@ _RESERVE = 0.01
 
 
 class Optics:
-    """Triangulation with the errors of the simulated laser: sensitivity, linearity, noise."""
+    """Triangulation with the errors of the simulated laser: sensitivity, linearity and noise."""
 
     def __init__(self, laser: Laser, random: Generator) -> None:
         self._laser, self._random = laser, random
