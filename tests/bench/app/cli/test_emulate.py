@@ -115,7 +115,7 @@ def test_a_chassis_has_the_modules_that_it_was_given(tmp_path: Path) -> None:
     ("flags", "words"),
     [
         (("--sample-rate", "30000"), ("--sample-rate", "30000", "20000")),
-        (("--sample-rate", "150"), ("cutoff", "sample_rate / 2")),
+        (("--sample-rate", "150"), ("cutoff", "half the sample rate")),
         (("--seed", "-1"), ("--seed", "-1")),
         (("--lasers", "wireless"), ("wireless",)),
         (("--lead", "9"), ("--lead", "9")),
