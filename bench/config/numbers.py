@@ -4,8 +4,8 @@
     list     12.5 15 17.5          separated by spaces
     range    12:21:4   2:4:5Hz     start:stop:count, ascending, decimal ends exact
 
-Numbers from the command line, the window's form, configuration files and protocol files are all read by this module, so
-the same input is valid everywhere. A comma is never a separator: 0,25 would otherwise be 0 and 25.
+The command line, the window's form, protocol files and numbers with units in configuration files share this notation.
+A comma is never a separator: 0,25 would otherwise be 0 and 25.
 
 pint converts units, except between frequencies in Hz and angular frequencies, which are converted explicitly with 2 pi:
 pint treats the radian as a pure number.
@@ -59,7 +59,7 @@ def _root(unit: str) -> tuple[float, str]:
     try:
         factor, root = _registry().get_root_units(_registry().parse_units(_as_pint(unit)))
     except (pint.PintError, ValueError, TypeError, ArithmeticError, AttributeError):
-        raise ValueError(f"{unit!r} is an unknown unit: write it as mm, N/mm, m/s^2, Hz or deg") from None
+        raise ValueError(f"{unit!r} is an unknown unit: use one such as mm, N/mm, m/s^2, Hz or deg") from None
     # pint's base unit of mass is the gram; SI users expect the kilogram, and the factor of 1000 cancels
     text = str(root).replace("gram", "kilogram")
     return float(factor), "" if text == "dimensionless" else text
@@ -110,7 +110,7 @@ def spaced(start: str, stop: str, count: int) -> tuple[float, ...]:
 def read_number(text: str, unit: str = "1", *, whole: bool = False) -> float:
     """One number in the SI `unit`, converted from the unit in the text, if any; an int if `whole`.
 
-    Raises ValueError with the correct spelling, or without a message if the text does not resemble a number.
+    Raises ValueError, with a remedy if the cause is recognised and otherwise without a message.
     """
     digits, typed = _parted(text)
     value = _plain(digits) if not typed else _converted(digits, typed, unit)
@@ -152,7 +152,7 @@ def read_values(text: str, unit: str = "1", *, whole: bool = False) -> list[floa
 
 
 def items_of(tokens: Sequence[str]) -> list[str]:
-    """The items of a typed list, each a number or a range with its unit; an empty token gives an empty item.
+    """The items of a typed list, each a number or a range with its unit, if any; an empty token gives an empty item.
 
     Spaces also separate items within a token, except before a unit: "2.5 Hz 3 Hz" has two items.
     """
@@ -196,7 +196,7 @@ def carries_unit(text: str) -> bool:
 
 
 def _parted(text: str) -> tuple[str, str]:
-    """Digits and unit of a typed number. Raises ValueError, with the correct spelling if known."""
+    """Digits and unit of a typed number. Raises ValueError, with a remedy if the cause is recognised."""
     text = text.strip()
     if not text:
         raise ValueError("there is no value: remove the item, or enter a number")
@@ -232,5 +232,5 @@ def _plain(digits: str) -> float:
 def _converted(digits: str, typed: str, unit: str) -> float:
     if typed == unit:
         return _plain(digits)
-    # only if the units differ, because pint takes most of a second to load
+    # only if the units differ, because pint is slow to load
     return converted(digits, typed, unit)

@@ -52,7 +52,7 @@ class KeptFile:
                 self.item, str(path), f"the file cannot be read ({error.strerror}); check its path and permissions"
             ) from None
         except (ValueError, RecursionError) as error:
-            raise InvalidInput(self.item, str(path), f"it is not valid JSON: {error}") from None
+            raise InvalidInput(self.item, str(path), f"it cannot be read as JSON: {error}") from None
         content = cast(dict[str, Any], data) if isinstance(data, dict) else {}
         if content.get("format") != self.format:
             allowed = f'it is not a {self.item}: its "format" is not "{self.format}"; {self.remedy}'
@@ -94,14 +94,14 @@ def _content(path: Path, content: dict[str, Any]) -> dict[str, Any]:
 
 
 def _with_unit(finding: dict[str, Any]) -> dict[str, Any]:
-    """A finding in the file's format, with its unit after its numbers."""
+    """A finding in the file's format, with its unit after value and uncertainty."""
     name, value, uncertainty, *others = finding.items()
     return dict([name, value, uncertainty, ("unit", unit(finding["name"])), *others])
 
 
 def _without_unit(path: Path, place: int, finding: Any) -> Any:
-    """A finding without its unit, which is checked against the unit of the quantity. Validation reports other
-    errors.
+    """A finding without its unit. Raises InvalidInput if the unit is not that of the quantity, or if the date has no
+    time zone; validation reports other errors.
     """
     if not isinstance(finding, dict):
         return finding
@@ -115,7 +115,7 @@ def _without_unit(path: Path, place: int, finding: Any) -> Any:
         allowed = f'the unit of {name} is "{wanted}": convert value and uncertainty'
         raise InvalidInput(f"{path.name}: findings[{place}].unit", said, allowed)
     if isinstance(date := entry.get("date"), str) and not _has_zone(date):
-        allowed = 'it must be ISO 8601 with time zone, such as "2026-11-20T09:30:00Z"'
+        allowed = 'it must be an ISO 8601 time with a time zone, such as "2026-11-20T09:30:00Z"'
         raise InvalidInput(f"{path.name}: findings[{place}].date", date, allowed)
     return entry
 

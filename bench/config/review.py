@@ -1,8 +1,7 @@
 """Cross-checks of a whole configuration whose parts are valid.
 
-`rockbench config check`, `--dry-run`, a run and the window all use the same function. A limit beyond the bench's
-capabilities would never trip. It is therefore an error unless `limits.confirmed` names it; every run reports such a
-limit.
+`rockbench config check`, `--dry-run`, a run and the window all use this review. A limit beyond the bench's capabilities
+would never trip: it is an error, or a notice if `limits.confirmed` names it.
 """
 
 from collections.abc import Iterator
@@ -22,12 +21,11 @@ _ESTIMATE = 2.0
 accelerometer's range; larger limits are treated as typing errors.
 """
 _LONGEST_WAIT, _LONGEST_DEBOUNCE, _WORST_CLOCK = 60.0, 1.0, 0.1
-"""Longest accepted delays of the guard for a missing sensor or block and for an exceeded limit [s], given that the
-table at full velocity crosses its stroke in a quarter of a second; and a relative clock error greater than that of any
-quartz clock.
+"""Longest accepted delays of the guard [s], first for a lost or constant signal, late samples and heating, then for any
+other exceeded limit; and a relative clock error greater than that of any quartz clock.
 """
 _LEAST_ERROR = 1e-7
-"""Smallest plausible linearity error of a triangulation laser [m], far below the optoNCDT 1420's resolution of 8 um."""
+"""Smallest plausible value of the largest coefficient of a laser's linearity error [m]."""
 _REACH = {
     "acceleration": (0.5, 5000.0),
     "velocity": (0.02, 50.0),
@@ -40,8 +38,8 @@ _REACH = {
 _LEAST_SHARE = 0.01
 """Fraction of a channel's range below which a limit is unusual."""
 _NOISE = (1e-7, 1e-4)
-"""Usual amplitude spectral density of a channel's noise, relative to its range [1/Hz^0.5]: from that of a 16-bit
-converter to that of noise with an rms of 0.3 % of the range in a band of 1 kHz.
+"""Usual amplitude spectral densities of a channel's noise, relative to its range [1/Hz^0.5]. The upper one is that of
+noise with an rms of 0.3 % of the range in a band of 1 kHz.
 """
 
 
@@ -107,7 +105,7 @@ def _reaches(configuration: BenchConfiguration) -> Iterator[_Reach]:
     yield from _loads(configuration, acceleration[0])
     yield _Reach("laser_range", 1.0, "", "the laser's range")
     keys = "rig.laser_1_range" if bench == "rig" else f"{bench}.laser_1.measuring_range"
-    ranges = f"the range of the lasers ({keys} and laser_2)"
+    ranges = f"the sum of the lasers' half ranges ({keys} and laser_2)"
     yield _Reach("drift", sum(configuration.laser_half_ranges), "m", ranges)
     if configuration.backend == "hardware":
         yield _Reach("late", configuration.hardware.daq.buffer, "s", "the input buffer (hardware.daq.buffer)")

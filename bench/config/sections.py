@@ -28,13 +28,13 @@ class Acquisition(Parameters):
 
 
 Profile = Literal["fast", "steady"]
-"""Reaction profiles: "fast" for the shortest blocks and lead that a device sustains, "steady" for a busy computer."""
+"""Reaction profiles: "fast" for short blocks and a short lead, "steady" for a busy computer."""
 FAST, FAST_OVER_NETWORK, STEADY = (0.005, 0.01), (0.01, 0.02), (0.1, 0.1)
 """Block duration and lead [s]: fast on this computer, fast through a gRPC server, and steady, which is the default."""
 
 
 def acquisition_of(profile: Profile, *, networked: bool) -> Acquisition:
-    """Timing of a reaction profile; `networked` is for a gRPC server, where each call takes most of a millisecond."""
+    """Timing of a reaction profile; `networked` is for a gRPC server, where each call takes longer."""
     fast = FAST_OVER_NETWORK if networked else FAST
     block, lead = fast if profile == "fast" else STEADY
     return Acquisition(block_duration=block, lead=lead)
@@ -50,7 +50,7 @@ class Simulation(Parameters):
 
     @property
     def sample_rate(self) -> float:
-        """Samples per second of drive and inputs [1/s]."""
+        """Sample rate of drive and inputs [1/s]."""
         return self.bench.sample_rate
 
     @property
@@ -120,7 +120,7 @@ class Twin(Parameters):
     laser_lag: float | None = quantity(
         None,
         "s",
-        "delay of the lasers relative to the table's sensors; if absent, computed from their settings",
+        "delay of the lasers relative to the table's sensors; if absent, computed from the settings of the lasers",
         ge=-0.02,
         le=0.02,
         usual=(1e-4, 0.015),
@@ -129,8 +129,7 @@ class Twin(Parameters):
     residual_warn: float | None = quantity(
         0.15,
         "1",
-        "limit of the relative rms distance of the measured drift from the band, above which a warning is issued; "
-        "if absent, never",
+        "limit of the relative rms distance of the measured drift from the band, above which a warning is issued",
         gt=0,
     )
     residual_stop: float | None = quantity(
@@ -141,4 +140,6 @@ class Twin(Parameters):
         gt=0,
         example=0.5,
     )
-    persistence: float = quantity(2.0, "s", "time for which a limit must be exceeded before it trips", ge=0, le=60)
+    persistence: float = quantity(
+        2.0, "s", "time for which a residual must exceed its limit before the limit trips", ge=0, le=60
+    )

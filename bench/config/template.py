@@ -56,7 +56,7 @@ _WIRED = {
     "hardware.laser_1.port": "COM5",
     "hardware.laser_2.port": "COM6",
 }
-"""Values in templates for keys without a usable default."""
+"""Values in the hardware template for keys without a usable default."""
 
 _DEVICES = [
     *(f"hardware.{key}" for key in ("sample_rate", "half_stroke", "band_low", "band_high")),
@@ -81,7 +81,7 @@ def write_template(path: Path, kind: Kind = "all", backend: str | None = None) -
     if backend is not None:
         settings = load_backend(backend).settings
         if not issubclass(settings, RigSettings):
-            raise InvalidInput("--backend", backend, "it is built in: omit it, or use --hardware")
+            raise InvalidInput("--backend", backend, "this backend is built in: omit --backend, or use --hardware")
         lines = [*_chosen(["backend", *_FRAME_AND_BLOCK, *_LIMITS], {"backend": backend}), "", "[rig]"]
         lines += _lines(settings, ("rig",))
     elif kind == "all":
@@ -125,7 +125,7 @@ def _lines(model: type[Parameters], path: tuple[str, ...]) -> Iterator[str]:
 
 
 def _absent(group: type[Parameters], of: Declared, prefix: str) -> Iterator[str]:
-    """The lines of an absent group, with dotted keys so that each line stays in its table."""
+    """The lines of a group that is absent by default, with dotted keys so that each line stays in its table."""
     yield f"# {prefix}: {of.description or summary(group)}"
     required = any(field.is_required() for field in group.model_fields.values())
     for entry in declared(group):

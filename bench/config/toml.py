@@ -1,8 +1,8 @@
 """Configuration files: TOML in SI units, fully validated before anything starts.
 
-A template, written by `bench.config.template`, has every key, the essential keys, or the keys of a bench with NI and
-optoNCDT devices. Templates are generated from the declarations, so that keys, units, limits and defaults are those of
-the program. Every commented-out line is complete: removing its # sets the key.
+A template, written by `bench.config.template`, has every key, the essential keys, the keys of a bench with NI and
+optoNCDT devices, or those of a backend of another package. Templates are generated from the declarations, so that keys,
+units, limits and defaults are those of the program. Every commented-out line is complete: removing its # sets the key.
 """
 
 import re
@@ -21,7 +21,7 @@ from sim.errors import InvalidInput
 from sim.identified import Identified
 
 _NO_DECIMAL = re.compile(r"""^[ \t]*([\w.-]+)[ \t]*=[^"'#\n]*?(\b0[xob]\w+|\b\d+_\w+)""", re.MULTILINE)
-"""A hexadecimal, octal, binary or underscored number in a file, with its key."""
+"""Key and value of a line with a hexadecimal, octal, binary or underscored number."""
 
 
 def read_table(path: Path, item: str) -> dict[str, Any]:
@@ -66,7 +66,7 @@ def _hint(text: str, error: str) -> str:
 
 
 def read_configuration(path: str | PathLike[str]) -> BenchConfiguration:
-    """The cross-checked configuration in a file, including the contents of the files that it names.
+    """The cross-checked configuration in a file, with the contents of its specimen and calibration files.
 
     Raises InvalidInput naming file and key.
     """
@@ -84,9 +84,10 @@ def former_keys(path: str | PathLike[str]) -> tuple[str, ...]:
 
 
 def problems_of(path: Path) -> list[InvalidInput]:
-    """All errors of a configuration file, in single keys or their combination; empty for a valid file.
+    """The errors in single keys of a configuration file or, if there are none, in their combination; empty for a valid
+    file.
 
-    Raises InvalidInput if it is not TOML.
+    Raises InvalidInput if the file cannot be read or is not TOML.
     """
     found = problems(BenchConfiguration, read_table(path, "configuration file"), _within(path))
     if found:
@@ -110,9 +111,9 @@ def _refusals(configuration: BenchConfiguration, path: Path) -> list[InvalidInpu
 
 
 def _with_specimen_file(configuration: BenchConfiguration, path: Path) -> BenchConfiguration:
-    """Replace the name of the specimen file, which is relative to the folder of `path`, by its contents.
+    """Replace the name of the specimen file, relative to the folder of `path`, by its contents.
 
-    Raises InvalidInput if it cannot be read.
+    Raises InvalidInput if the file cannot be read or its specimen is impossible.
     """
     if configuration.specimen_file is None:
         return configuration

@@ -1,4 +1,4 @@
-"""Notices about valid but unusual values: those outside the usual range in their declaration."""
+"""Notices about valid but unusual values, such as those outside the usual range in their declaration."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from functools import cache

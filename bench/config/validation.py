@@ -46,7 +46,7 @@ def validated(model: type[P], data: Mapping[str, Any], named: Callable[[Path], s
 def problems(
     model: type[Parameters], data: Mapping[str, Any], named: Callable[[Path], str] = dotted
 ) -> list[InvalidInput]:
-    """Every invalid value in `data`, in the order of the declaration; empty if all are valid."""
+    """The error of each invalid value in `data`; empty if all values are valid."""
     try:
         _parsed(model, data)
     except ValidationError as error:
@@ -160,7 +160,7 @@ def _values_or_text(entry: Declared, text: str) -> Sequence[Any]:
 
 
 def _remedy(entry: Declared, text: str, listed: bool) -> str:
-    """Suggested spelling of a number for an invalid string; empty if there is none."""
+    """Remedy for text that is not a valid number; empty if there is none."""
     try:
         if listed:
             items = items_of([text])

@@ -26,9 +26,7 @@ Complex = NDArray[np.complex128]
 Quantity = Literal["displacement", "velocity", "acceleration"]
 
 _CLIPPINGS = 200
-"""Number of clipping rounds. They reduce the crest factor from about 3.5 to 1.5, in less than 0.1 s for 16 000
-samples.
-"""
+"""Number of clipping rounds. They typically reduce the crest factor from about 3.5 to 1.5."""
 _FIRST_CLIP, _LAST_CLIP = 0.75, 0.95
 """Clipping levels of the first and the last round, relative to the peak."""
 
@@ -37,7 +35,7 @@ _FIRST_CLIP, _LAST_CLIP = 0.75, 0.95
 class Multisine:
     """One period of drive, made of `lines` (multiples of the period's frequency) with complex `spectrum` [V].
 
-    The amplitude of line k is |spectrum[k]|; both have shape (n_lines,). `samples` is the number of samples per period,
+    The amplitude of the k-th line is |spectrum[k]|; both have shape (n_lines,). `samples` is the number of samples per period,
     `sample_rate` is in 1/s.
     """
 
@@ -71,7 +69,7 @@ class Multisine:
 def band_lines(samples: int, sample_rate: float, band: tuple[float, float], *, odd: bool = False) -> Lines:
     """The lines of a period of `samples` samples within `band` [Hz], ends included; only the odd ones if `odd`.
 
-    Odd lines are free of even-order distortion. Raises InvalidInput for a band without lines or beyond half the sample
+    If only odd lines are driven, even-order distortion does not fall on them. Raises InvalidInput for a band without lines or beyond half the sample
     rate.
     """
     low, high = band
@@ -146,7 +144,7 @@ class LineResponse:
     `response` [unit/V] has the standard `uncertainty` due to noise and distortion together; `noise` is the contribution
     of noise to it, `distortion` the standard deviation of one realisation's response due to distortion alone, NaN for a
     single realisation. `noise_density` [unit/Hz^0.5] is the amplitude spectral density of the noise in the output.
-    `coherence` is that between drive and output.
+    `coherence` is the magnitude-squared coherence between drive and output.
     """
 
     frequency: Array
@@ -187,7 +185,7 @@ def line_response(drive: Complex, output: Complex, frequency: Array, spacing: fl
     """
     realisations, periods = drive.shape[0], drive.shape[1]
     if drive.shape != output.shape or drive.shape[2:] != frequency.shape:
-        raise InvalidInput("output", output.shape, f"the drive has the shape {drive.shape}: the shapes must agree")
+        raise InvalidInput("output", output.shape, f"it must agree with the shapes of drive, {drive.shape}, and frequency, {frequency.shape}")
     if periods < 2:
         raise InvalidInput("periods", periods, "at least two are required, to estimate the noise")
     u, y = drive.mean(axis=1), output.mean(axis=1)
@@ -228,7 +226,7 @@ def identify_table(
     """Identify the table from periods of drive [V] and table acceleration [m/s2] in steady state.
 
     Arrays have the shape (realisations, periods, samples); at least two realisations and two periods are required.
-    `date` and `specimen` record the time and the specimen on the table. Raises InvalidInput.
+    `date` and `specimen` record the time and the specimen on the table. Raises InvalidInput otherwise.
     """
     if drive.shape[0] < 2:
         raise InvalidInput("realisations", drive.shape[0], "at least two are required, to estimate the distortion")

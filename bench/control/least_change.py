@@ -1,9 +1,9 @@
 """Smallest change of a record that keeps the table within its limits of stroke and velocity at every sample.
 
-The change is a sum of slow half sines. Its cost is the integral of its square, weighted by frequency because slow parts
+The change is a sum of slow sines, zero at both ends of the record. Its cost is the integral of its square, weighted by frequency because slow parts
 hardly affect the specimen, plus its effect on the peaks of oscillators at given periods. This is a least-squares
 problem with linear inequalities: displacement and velocity at the samples are linear in the amplitudes of the sines.
-Only samples near a limit enter the problem; the solver adds other samples when they exceed a limit.
+Inequalities are added at the peaks of the motion that reach a limit, until every sample is within its limits.
 """
 
 from dataclasses import dataclass
@@ -115,8 +115,8 @@ class Peak:
 
 
 def oscillator_peak(acceleration: Array, dt: float, period: float, damping: float) -> Peak:
-    """`Peak` of the oscillator of `period` [s] under `acceleration` [m/s2], shape (n,), evaluated at the sample nearest
-    to the peak.
+    """`Peak` of the oscillator of `period` [s] under `acceleration` [m/s2], shape (n,), evaluated at the sample with the
+    largest response.
 
     Uses the recursion of `bench.analysis.response_spectrum`: z' = lambda z + a, exact for linear interpolation between
     samples.
@@ -186,9 +186,9 @@ def fit_by_least_change(
     """`acceleration` [m/s2], shape (n,), with the smallest change that keeps the table within `reach` and leaves it at
     rest.
 
-    `periods` [s] and `damping` are those of the oscillators whose peaks are preserved; the change consists of half
-    sines with frequencies of at least `lowest` [Hz]. Raises InvalidInput if no change with frequencies between `lowest`
-    and 2 Hz (or four times `lowest`, if higher) is sufficient.
+    `periods` [s] and `damping` are those of the oscillators whose peaks are preserved; the change consists of
+    sines with frequencies of at least `lowest` [Hz]. Raises InvalidInput if no sufficient change with frequencies
+    between `lowest` and 2 Hz (or four times `lowest`, if higher) is found.
     """
 
     def peaks_of(record: Array) -> list[Peak]:
@@ -261,7 +261,7 @@ class _Problem:
         return np.concatenate((velocity, displacement)) / scale[:, None], last / scale
 
     def _broken(self, motion: TableMotion) -> list[_Bound]:
-        """The local peaks at which a motion exceeds a limit."""
+        """The local peaks at which a motion exceeds a limit or comes within the fraction `CLOSER` of it."""
         found: list[_Bound] = []
         for share, far in (
             (motion.velocity / self._reach.velocity, False),

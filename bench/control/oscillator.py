@@ -99,7 +99,7 @@ class Oscillator:
     def reset(self) -> None:
         """Reset to zero drive; keeps the calibration."""
         self._sweeps: deque[Sweep] = deque()
-        self._into = 0  # number of samples already played of the first sweep
+        self._into = 0  # number of samples of the first sweep already played
         self._amplitude, self._omega, self._phase = 0.0, tau, 0.0
         self._shares = ShareRamp()
 

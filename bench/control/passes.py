@@ -23,7 +23,7 @@ class Envelope:
 
     @staticmethod
     def of(volts: Array, acceleration: Array, displacement: Array | None, sample_rate: float) -> "Envelope":
-        """Envelope of a drive [V] and a table acceleration [m/s2]; the integrals exclude the mean acceleration.
+        """Envelope of a drive [V] and a table acceleration [m/s2], whose mean is removed before integration.
 
         `displacement` [m] is the measured displacement; without it the acceleration is integrated twice.
         """
@@ -119,7 +119,7 @@ class Pass:
 
 
 class SpectrumCheck:
-    """Compares response spectra with the spectrum of a target."""
+    """Comparison of response spectra with the spectrum of a target."""
 
     def __init__(
         self, target: Array, sample_rate: float, band: tuple[float, float], periods: tuple[float, ...]
@@ -134,7 +134,7 @@ class SpectrumCheck:
         return float(np.abs(self._spectrum(achieved) / self._target_spectrum - 1.0).max())
 
     def clear_error(self, achieved: Array, frequency: Array, noise: Array) -> tuple[float, float]:
-        """Largest relative deviation not explained by noise, and its period [s]; both zero if there is none.
+        """Largest relative deviation not explained by noise, and its period [s]; the deviation is zero if there is none.
 
         `noise`, shape (n_lines,), is the expected |numpy.fft.rfft|^2 of the non-repeatable part of `achieved`, at
         `frequency` [Hz], above zero. Noise shifts a peak by about the noise of the oscillator's response; a deviation

@@ -1,4 +1,4 @@
-"""Preparation of a record as a table motion: trimming, band limitation, scaling, stroke fit.
+"""Preparation of a record as a table motion: similitude, trimming, band limitation, scaling and stroke fit.
 
 Prediction and test use the same prepared motion and are therefore comparable. The order matters: band limitation may
 remove the record's peak, so the record is scaled afterwards; the stroke limits the scaled motion.
