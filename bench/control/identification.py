@@ -35,8 +35,8 @@ _FIRST_CLIP, _LAST_CLIP = 0.75, 0.95
 class Multisine:
     """One period of drive, made of `lines` (multiples of the period's frequency) with complex `spectrum` [V].
 
-    The amplitude of the k-th line is |spectrum[k]|; both have shape (n_lines,). `samples` is the number of samples per period,
-    `sample_rate` is in 1/s.
+    The amplitude of the k-th line is |spectrum[k]|; both have shape (n_lines,). `samples` is the number of samples per
+    period, `sample_rate` is in 1/s.
     """
 
     lines: Lines
@@ -69,8 +69,8 @@ class Multisine:
 def band_lines(samples: int, sample_rate: float, band: tuple[float, float], *, odd: bool = False) -> Lines:
     """The lines of a period of `samples` samples within `band` [Hz], ends included; only the odd ones if `odd`.
 
-    If only odd lines are driven, even-order distortion does not fall on them. Raises InvalidInput for a band without lines or beyond half the sample
-    rate.
+    If only odd lines are driven, even-order distortion does not fall on them. Raises InvalidInput for a band without
+    lines or beyond half the sample rate.
     """
     low, high = band
     if not 0.0 < low < high < 0.5 * sample_rate:
@@ -185,7 +185,8 @@ def line_response(drive: Complex, output: Complex, frequency: Array, spacing: fl
     """
     realisations, periods = drive.shape[0], drive.shape[1]
     if drive.shape != output.shape or drive.shape[2:] != frequency.shape:
-        raise InvalidInput("output", output.shape, f"it must agree with the shapes of drive, {drive.shape}, and frequency, {frequency.shape}")
+        allowed = f"it must agree with the shapes of drive, {drive.shape}, and frequency, {frequency.shape}"
+        raise InvalidInput("output", output.shape, allowed)
     if periods < 2:
         raise InvalidInput("periods", periods, "at least two are required, to estimate the noise")
     u, y = drive.mean(axis=1), output.mean(axis=1)

@@ -1,8 +1,9 @@
 """Smallest change of a record that keeps the table within its limits of stroke and velocity at every sample.
 
-The change is a sum of slow sines, zero at both ends of the record. Its cost is the integral of its square, weighted by frequency because slow parts
-hardly affect the specimen, plus its effect on the peaks of oscillators at given periods. This is a least-squares
-problem with linear inequalities: displacement and velocity at the samples are linear in the amplitudes of the sines.
+The change is a sum of slow sines, zero at both ends of the record. Its cost is the integral of its square, weighted by
+frequency because slow parts hardly affect the specimen, plus its effect on the peaks of oscillators at given periods.
+This is a least-squares problem with linear inequalities: displacement and velocity at the samples are linear in the
+amplitudes of the sines.
 Inequalities are added at the peaks of the motion that reach a limit, until every sample is within its limits.
 """
 
@@ -115,8 +116,8 @@ class Peak:
 
 
 def oscillator_peak(acceleration: Array, dt: float, period: float, damping: float) -> Peak:
-    """`Peak` of the oscillator of `period` [s] under `acceleration` [m/s2], shape (n,), evaluated at the sample with the
-    largest response.
+    """`Peak` of the oscillator of `period` [s] under `acceleration` [m/s2], shape (n,), evaluated at the sample with
+    the largest response.
 
     Uses the recursion of `bench.analysis.response_spectrum`: z' = lambda z + a, exact for linear interpolation between
     samples.

@@ -134,7 +134,7 @@ class SpectrumCheck:
         return float(np.abs(self._spectrum(achieved) / self._target_spectrum - 1.0).max())
 
     def clear_error(self, achieved: Array, frequency: Array, noise: Array) -> tuple[float, float]:
-        """Largest relative deviation not explained by noise, and its period [s]; the deviation is zero if there is none.
+        """Largest relative deviation not explained by noise, and its period [s]; a deviation of zero means none.
 
         `noise`, shape (n_lines,), is the expected |numpy.fft.rfft|^2 of the non-repeatable part of `achieved`, at
         `frequency` [Hz], above zero. Noise shifts a peak by about the noise of the oscillator's response; a deviation

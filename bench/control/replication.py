@@ -1,15 +1,16 @@
 """Waveform replication: iterative learning of the drive with which the table follows a record.
 
-A pass plays the drive u and measures the table. The error E is corrected through the inverse of the table: u <- u + Q
+A pass plays the drive u and measures the table's acceleration. Its error E is corrected through the inverse of the table: u <- u + Q
 IFFT{ W K conj(H) / (|H|^2 + eps^2 max|H|^2) E }, where K contains the coherence and the fraction of E that is not
-noise. The iteration converges where |1 - Q H_true / H| < 1. After a pass with a large error, H is corrected by the
-response measured in that pass. A pass worse than the best one is rolled back; the best drive is played once more to
-measure the non-repeatable part, and the correction is halved. Thus the accepted error never grows, and neither noise
-nor non-repeatable motion is learned (De Cuyper, Linear feedback control for durability test rigs in the automotive
-industry, thesis, KU Leuven 2006).
+noise. The iteration converges where |1 - Q H_true / H| < 1. After an accepted pass with a large error, H is updated
+from the response measured in that pass. A pass worse than the best one is rolled back. If the best drive was played
+only once, it is played again to measure the non-repeatable part; the correction is halved unless the scatter between
+the two plays explains the larger error. Thus the accepted error never grows, and little noise or non-repeatable motion
+is learned (De Cuyper, Linear feedback control for durability test rigs in the automotive industry, thesis, KU Leuven
+2006).
 
-The passes end when the repeatable error is small enough both as root mean square, over the whole record, and in the
-response spectrum, which is sensitive to the few cycles that excite a structure.
+The iteration has converged when the repeatable error is small enough both as root mean square, over the whole record,
+and in the response spectrum, which is sensitive to the few cycles that excite a structure.
 """
 
 from typing import Literal
@@ -59,7 +60,7 @@ class ReplicationParameters(Parameters):
         1.1, "1", "required ratio of the limits to the largest predicted drive and motion", ge=1, le=3
     )
     beyond: Literal["refuse", "scale"] = quantity(
-        "refuse", "", "treatment of a drive beyond a limit: refuse it, or scale it down to fit"
+        "refuse", "", "treatment of a drive or motion beyond a limit over `margin`: refuse it, or scale it down to fit"
     )
     spectrum_band: tuple[float, float] = quantity(
         (0.1, 1.0), "s", "range of periods in which response spectra are compared"
@@ -68,7 +69,7 @@ class ReplicationParameters(Parameters):
 
 
 class Replication:
-    """Determines the drive for `target`. Use: play `drive` and pass the measurement to `learn`, until `finished`.
+    """Replication of `target`. Usage: play `drive` and pass the measurement to `learn`, until `finished`.
 
     ::
 
@@ -144,7 +145,7 @@ class Replication:
     def spectrum_error(self) -> tuple[float, float]:
         """Largest deviation, in excess of noise, of the response spectrum with the best drive, and its period [s].
 
-        Both are zero if there is none.
+        A deviation of zero means that noise explains every deviation.
         """
         table = self._table
         seen = table.record(table.window * (self._wanted - self._missing))
@@ -250,8 +251,8 @@ class Replication:
         return self._best + verdict.share * step, gain, verdict
 
     def _ends(self) -> Array:
-        """Factor that ramps the drive up from zero in the rest before the record, and down to zero in the rest after
-        it.
+        """Factor that ramps a correction of the drive up from zero in the rest before the record, and down to zero in
+        the rest after it.
         """
         n = max(self._target.rest // 4, 2)
         ramp = 0.5 * (1.0 - np.cos(np.pi * np.arange(n) / n))

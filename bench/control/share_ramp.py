@@ -1,4 +1,4 @@
-"""Shares of the harmonics of a drive, which change smoothly at given samples."""
+"""Shares of a drive's harmonics, with smooth changes that begin at given samples."""
 
 from collections import deque
 

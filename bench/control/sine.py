@@ -116,7 +116,8 @@ SIGNIFICANT_STEP = 5.0
 """Size of a step, in standard deviations, above which the secant of the step is used."""
 
 PLAUSIBLE = (0.5, 2.0)
-"""Range of plausible magnitudes of a table's secant; a block whose motion has not settled causes values outside it."""
+"""Range of plausible magnitudes of a table's secant; a block whose motion has not settled can cause values outside it.
+"""
 
 
 @dataclass(frozen=True)
@@ -137,7 +138,7 @@ class Tolerance:
 
 
 class SineControl:
-    """Determines the next shares of the drive from each measurement; harmonics above `highest` are not controlled."""
+    """Controller of the drive's shares, updated from each measurement; harmonics above `highest` are not controlled."""
 
     def __init__(self, highest: int, tolerance: Tolerance) -> None:
         self._highest = highest

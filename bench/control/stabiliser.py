@@ -59,14 +59,14 @@ class StabiliserDesign:
 
     @staticmethod
     def of(cycle_map: CycleMap) -> "StabiliserDesign":
-        """Solve the two Riccati equations; this takes up to half a second. Raises numpy.linalg.LinAlgError or
-        ValueError if no control stabilises the orbit.
+        """Design from the solutions of two Riccati equations. Raises numpy.linalg.LinAlgError or ValueError if no
+        control stabilises the orbit.
         """
         return StabiliserDesign(cycle_map, _regulator(cycle_map), _filter(cycle_map))
 
 
 class Stabiliser:
-    """Determines the control of each cycle, a complex share with a magnitude of at most `authority`."""
+    """Control of each cycle from the measured cycles: a complex share with a magnitude of at most `authority`."""
 
     def __init__(self, design: StabiliserDesign, authority: float) -> None:
         self._map, self._authority = design.cycle_map, authority
@@ -80,8 +80,8 @@ class Stabiliser:
 
     @property
     def deviation(self) -> float:
-        """Norm of the estimated deviation of y from that of the orbit at the beginning of the next cycle, relative to
-        the norm on the orbit.
+        """Norm of the estimated deviation of y from its value on the orbit, at the beginning of the next cycle,
+        relative to the norm of that value.
         """
         return float(np.linalg.norm(self._map.outputs @ self._state) / np.linalg.norm(self._map.orbit))
 
@@ -167,7 +167,7 @@ GROWTH = 1.5
 
 @dataclass
 class HoldMonitor:
-    """Detects the capture of a motion and the reasons to release the hold.
+    """Monitor of a hold: detects the capture of the motion and the reasons to release the hold.
 
     `patience` is the number of cycles within which the motion must be captured, `largest` [m] the largest allowed peak
     drift, and `answer` the table's fundamental before the hold, per share of the drive.
@@ -187,7 +187,7 @@ class HoldMonitor:
         self.cycles += 1
         self._missing += 1
         if self._missing >= MISSING:
-            return f"{MISSING} successive cycles could not be measured: a sensor has lost its target"
+            return f"{MISSING} successive cycles could not be measured: a sensor may have lost its target"
         return self._late()
 
     def push(self, control: complex, drift: float, played: complex, achieved: complex) -> str | None:

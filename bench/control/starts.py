@@ -3,8 +3,9 @@
 At many points, switching the sine on overturns the block; at high frequencies it leaves the block at rest. The
 transient is chaotic and the specimen is uncertain, so each candidate is simulated with specimens drawn from the
 identification's uncertainty and with slightly different drives. A few draws select candidates and new draws rate those
-that remain, so the stated probability is not biased by the selection. Each selection round tries short candidates first
-and ends once enough of them have succeeded with every draw, since a longer candidate could not displace them.
+that remain, so the stated probability is not biased by the selection. Each selection round simulates the candidates in
+order of preference, by successes so far and then by duration, and ends once enough of them have succeeded with every
+draw, since a later candidate could not displace them.
 """
 
 from collections.abc import Sequence
@@ -26,9 +27,7 @@ from sim.steady import NoOrbit, Orbit, rocking_orbit
 Counts = NDArray[np.float64]
 
 TOPS = (22.0, 24.0, 26.0, 28.0)
-"""Frequencies [rad/s] at which the ramp before a downward sweep is driven: there the block rocks little, and the frame
-is far from resonance.
-"""
+"""Frequencies [rad/s] of the ramp before a downward sweep; only those above the requested frequency are tried."""
 
 RAMPS = ((6.0, 0.0), (12.0, 0.0), (6.0, 10.0))
 """Durations [s] of the ramp before a downward sweep, and of the wait between ramp and sweep."""
@@ -40,12 +39,12 @@ DIRECT_RAMPS = (8.0, 16.0)
 """Durations [s] of a ramp directly at the requested frequency."""
 
 OVERSHOOTS = (1.0, 1.2)
-"""Ratios of the amplitude of ramp and chirp to the requested amplitude; a larger amplitude uplifts a block that would
-stay at rest.
+"""Ratios of the amplitude of ramp and chirp to the requested amplitude; a larger amplitude can uplift a block that
+would otherwise stay at rest.
 """
 
 EASE = 6.0
-"""Time [s] within which the amplitude is reduced from the overshoot at the requested frequency."""
+"""Duration [s] of the reduction of an overshoot to the requested amplitude, at the requested frequency."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +61,7 @@ class Candidate:
 
 
 def candidates(omega: float, amplitude: float) -> list[Candidate]:
-    """All candidate start-ups to `amplitude` [m/s2] at `omega` [rad/s], without duplicates."""
+    """All candidate start-ups to `amplitude` [m/s2] at `omega` [rad/s]."""
     found = [_direct(omega, amplitude, *values) for values in product(DIRECT_RAMPS, OVERSHOOTS)]
     above = [top for top in TOPS if top > omega]
     found += [_from_above(omega, amplitude, *values) for values in product(above, RAMPS, CHIRPS, OVERSHOOTS)]
@@ -116,7 +115,7 @@ TOLERANCE = 1e-7
 """Relative tolerance of the simulations."""
 
 CATCH_ANGLE = 0.35
-"""Tilt [rad] beyond which the block counts as fallen: no spring of the campaign could set it upright again."""
+"""Tilt [rad] beyond which the block counts as fallen."""
 
 CLOSE = 0.10
 """Relative difference between the peaks of drift and tilt and those of the orbit, below which a motion counts as

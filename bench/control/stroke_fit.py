@@ -77,7 +77,7 @@ def high_passed(acceleration: Array, dt: float, corner: float) -> HighPassed:
 
 
 PERIODS = np.geomspace(0.1, 2.0, 40)
-"""Periods [s] at which the change of the response spectrum is minimised and reported."""
+"""Default periods [s] at which a fit reports the change of the response spectrum; the least change keeps it small."""
 
 SHORTEST = 16
 """Minimum number of samples of a record."""
@@ -179,7 +179,7 @@ def fit_stroke(
 def _least_change(
     original: Array, dt: float, reach: Reach, periods: Array, damping: float, band: tuple[float, float] | None
 ) -> Array:
-    """The record with the smallest sufficient change. The half sines end with the record and therefore have slight
+    """The record with the smallest sufficient change. The sines end with the record and therefore have slight
     content below their frequency, outside the table's `band`. This content is removed; if the motion then exceeds the
     reach or does not end at rest, the record is fitted again.
     """
