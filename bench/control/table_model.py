@@ -98,7 +98,7 @@ class TableModel(Parameters):
         if not timedelta(0) <= age <= longest:
             hours = longest.total_seconds() / 3600.0
             allowed = (
-                f"at {now.isoformat(timespec='seconds')} it must be at most {hours:g} h old; identify the table again"
+                f"at {now.isoformat(timespec='seconds')} it must be at most {hours:g} h old and not later; identify the table again"
             )
             raise InvalidInput("date of the table model", self.date.isoformat(timespec="seconds"), allowed)
 
@@ -120,7 +120,7 @@ class TableModel(Parameters):
 
     @staticmethod
     def read(path: Path) -> "TableModel":
-        """The model in a JSON file. Raises InvalidInput naming file and key."""
+        """The model in a JSON file. Raises InvalidInput naming the unreadable file or the key with an invalid value."""
         try:
             data: Any = json.loads(read_bounded(path).decode())
             require_shallow(data)
@@ -131,7 +131,7 @@ class TableModel(Parameters):
                 "table model", str(path), f"the file cannot be read ({error.strerror}); check its path and permissions"
             ) from None
         except (ValueError, RecursionError) as error:
-            raise InvalidInput("table model", str(path), f"the file is not valid JSON: {error}") from None
+            raise InvalidInput("table model", str(path), f"the file cannot be read as JSON: {error}") from None
         return validated(TableModel, data)
 
     @property
@@ -158,7 +158,7 @@ _TINY = 1e-12
 
 
 class TableInverse:
-    """Converts between drive and acceleration at the lines of a target's transform within the target's support.
+    """Conversion between drive and acceleration at the lines of a target's transform within the target's support.
 
     Spectra are `numpy.fft.rfft` of whole records at those lines, shape (n_lines,).
     """
@@ -204,7 +204,7 @@ class TableInverse:
         return self.record(self.window * self._coherence * real_share * inverse * missing)
 
     def refine(self, volts: Array, measured: Complex) -> None:
-        """Correct the response by the smooth, coherent part of the measured response of a pass."""
+        """Update the response from the smooth, coherent part of the response measured in a pass."""
         predicted = self._response * self.spectrum(volts)
         cross = octave_mean(np.conj(predicted) * measured, self.frequency)
         input_power = octave_mean(np.abs(predicted) ** 2, self.frequency)

@@ -107,8 +107,8 @@ def integrated(acceleration: Array, sample_rate: float) -> tuple[Array, Array]:
 
 
 def band_window(frequency: Array, band: tuple[float, float]) -> Array:
-    """Weight at each frequency, same shape: 1 within the band widened by FLAT, 0 beyond REACH, and half a cosine in the
-    logarithm of the frequency in between.
+    """Weight at each frequency, same shape: 1 within the band widened by FLAT, 0 beyond REACH, and in between a
+    half-cosine taper in the logarithm of frequency.
     """
     low, high = band
     inside = (frequency > low / REACH) & (frequency < high * REACH)

@@ -27,7 +27,7 @@ RETRIES = 28
 """Number of attempts to read metadata of a file that is being written; the pauses between them double, starting at 1
 ns, and last 0.3 s in total.
 
-With HDF5's default of 100 attempts, reading data that another program has truncated would practically never end, and
+With HDF5's default of 100 attempts, reading a file that another program has truncated would practically never end, and
 would block the whole process, including the drive.
 """
 
@@ -37,7 +37,7 @@ def locking(system: str = sys.platform) -> Literal["best-effort"] | bool:
 
     On Windows locks are mandatory: a reader of a file that is being written would make its writer fail at the next
     flush or at the end, with errno 13. No locks are used there; single-writer mode and creation without replacement
-    protect the file. Elsewhere locks are advisory, and network shares may have none.
+    protect the file. Elsewhere locks are advisory, and network shares may not support them.
     """
     return False if system == "win32" else "best-effort"
 
@@ -96,8 +96,8 @@ ever in a heap of zeros.
 
 
 class Quiet(io.RawIOBase):
-    """A file presented to HDF5 as if its writer had closed it, with the length stated in its superblock; missing bytes
-    are read as `MISSING`.
+    """A file presented to HDF5 as if its writer had closed it, with the length stated in its superblock, if plausible;
+    missing bytes are read as `MISSING`.
 
     In metadata such bytes fail the checksums. Uncompressed values have no checksums: their readers must first determine
     where they end with `bench.datafile.opening`.

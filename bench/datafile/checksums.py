@@ -80,7 +80,7 @@ def of_values(stored: hdf5.Dataset) -> str:
 
 
 def of_attributes(stored: hdf5.Dataset) -> str:
-    """SHA-256 of the attributes of a dataset as JSON: names in order, arrays as lists."""
+    """SHA-256 of the attributes of a dataset as JSON: names sorted, arrays as lists."""
     return _of_json(_attributes(stored))
 
 
@@ -149,7 +149,7 @@ def _plain(value: Any) -> Any:
 
 
 SMALL = 2**20
-"""Largest size [bytes] of a dataset that is checked by default; hashing it takes a few milliseconds."""
+"""Largest size [bytes] of a dataset whose values are checked by default."""
 
 
 @dataclass(frozen=True)
@@ -175,7 +175,8 @@ class Integrity:
 
 
 def integrity(entry: hdf5.Group, largest: int | None = SMALL, done: Done = lambda _done, _all: None) -> Integrity:
-    """Compare all attributes, and all datasets of at most `largest` bytes (None for no limit), with their checksums.
+    """Compare all attributes and links, and all datasets of at most `largest` bytes (None for no limit), with their
+    checksums.
 
     `done` receives the number of datasets processed and the total.
     """
@@ -224,7 +225,7 @@ def _compared(stored: hdf5.Dataset, values: str, attributes: str) -> str:
     if of_attributes(stored) != attributes:
         found.append(f"the attributes of {stored.name} were changed")
     if values and of_values(stored) != values:
-        found.append(f"{stored.name} was changed: its checksum is wrong")
+        found.append(f"{stored.name} was changed: its checksum does not match")
     return "; ".join(found)
 
 

@@ -21,10 +21,9 @@ BYTES_AT_ONCE = 2**22
 
 @dataclass
 class Copying:
-    """Copies a file of `size` bytes: the first `counted` rows of each part, without the objects at the paths in
-    `leave`.
+    """Copy of a file of `size` bytes: up to `counted` rows of each part, without the objects at the paths in `leave`.
 
-    `lost` receives the reason for each unreadable path; growing datasets are copied up to the first unreadable row.
+    `lost` receives a message for each unreadable path; growing datasets are copied up to the first unreadable row.
     """
 
     counted: Mapping[str, int]
@@ -88,7 +87,7 @@ class Copying:
 
 
 def copy_attributes(source: Group, target: Group, lost: dict[str, str]) -> None:
-    """Copy every readable attribute of a group, unchanged."""
+    """Copy the attributes of a group, unchanged, up to the first unreadable one."""
     try:
         for name in source.attrs:
             target.attrs[name] = source.attrs[name]
@@ -100,7 +99,7 @@ _ROWS_AT_ONCE = 2**18
 
 
 def drop_channels(entry: hdf5.Group, lost: dict[str, str]) -> None:
-    """Remove the counts of every channel whose conversion cannot be read, and add the reason to `lost`."""
+    """Remove the counts of every channel whose conversion cannot be read, and add a message to `lost`."""
     instrument = hdf5.group(entry, "instrument")
     for name in hdf5.names(instrument):
         if hdf5.has(instrument, f"{name}/counts"):

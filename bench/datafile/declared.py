@@ -135,7 +135,7 @@ FORMER = (
     *("raw_values", "hold_cycles", "operator_notes"),
 )
 """Names, in order, of the counters in the dataset `complete` in files of earlier versions, which do not name the
-counters. Rows beyond these counts were incomplete when the disk or the writer failed.
+counters. Rows beyond these counts may be incomplete, because the disk or the writer failed.
 """
 
 

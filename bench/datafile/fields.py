@@ -58,7 +58,9 @@ class Field:
         return np.dtype(np.int64 if self.kind is Kind.WHOLE and not self.optional else np.float64)
 
     def create(self, parent: hdf5.Group) -> hdf5.Dataset:
-        """Create the empty dataset of this field, usually without compression, so that rows are appended in place."""
+        """Create the empty dataset of this field, without compression unless packed, so that rows are appended in
+        place.
+        """
         if self.kind is Kind.TEXT:
             made = hdf5.grow_texts(
                 parent, self.name, TEXT_WIDTH, description=self.description, chunk=ROWS_PER_CHUNK // 4
@@ -192,5 +194,5 @@ def _classify(item: str, annotation: Any) -> tuple[Kind, bool]:
             if issubclass(annotation, types):
                 return kind, False
     raise InvalidInput(
-        item, repr(annotation), "a recorded field must be a number, a switch or a string; each may also be None"
+        item, repr(annotation), "a recorded field must be a number, a switch or a string (or None), or an array of numbers"
     )

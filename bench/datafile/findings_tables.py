@@ -1,8 +1,7 @@
 """Tables of fitted models and of the identified specimen, whose rows refer to one another.
 
 No group can be added to a file that is being read, so one dataset holds the concatenated values of all fits. The NXdata
-groups of a closed file are views of it (HDF5 virtual datasets) without their own values, for viewers such as silx,
-NexPy and h5web.
+groups of a closed file are views of it (HDF5 virtual datasets) for viewers such as silx, NexPy and h5web.
 """
 
 from collections.abc import Mapping, Sequence
@@ -28,7 +27,7 @@ FITS = (
 )
 FIT_COLUMNS = (
     Field("name", Kind.TEXT, "", "name of the column; the first of a fit is its axis"),
-    Field("unit", Kind.TEXT, "", "its unit"),
+    Field("unit", Kind.TEXT, "", "unit of the column"),
     Field("description", Kind.TEXT, "", "description"),
 )
 FIT_PARAMETERS = (
@@ -119,7 +118,7 @@ def _table(entry: hdf5.Group, name: str) -> list[dict[str, Any]]:
 
 FINDINGS = (
     Field(
-        "number", Kind.WHOLE, "1", "number of the set: the number of rows of all earlier sets; the last set is valid"
+        "number", Kind.WHOLE, "1", "number of the set, equal to the number of rows of all earlier sets; the last set is valid"
     ),
     Field("time", Kind.REAL, "s", "bench time"),
     Field("name", Kind.TEXT, "", "name of the quantity, as in a specimen file"),
