@@ -2,12 +2,12 @@
 
 A pass plays the drive u and measures the table's acceleration. Its error E is corrected through the inverse of the
 table: u <- u + Q IFFT{ W K conj(H) / (|H|^2 + eps^2 max|H|^2) E }, where K contains the coherence and the fraction of E
-that is not noise. The iteration converges where |1 - Q H_true / H| < 1. After an accepted pass with a large error, H is updated
-from the response measured in that pass. A pass worse than the best one is rolled back. If the best drive was played
-only once, it is played again to measure the non-repeatable part; the correction is halved unless the scatter between
-the two plays explains the larger error. Thus the accepted error never grows, and little noise or non-repeatable motion
-is learned (De Cuyper, Linear feedback control for durability test rigs in the automotive industry, thesis, KU Leuven
-2006).
+that is not noise. The iteration converges where |1 - Q H_true / H| < 1. After an accepted pass with a large error, H is
+updated from the response measured in that pass. A pass worse than the best one is rolled back. If the best drive was
+played only once, it is played again to measure the non-repeatable part; the correction is halved unless the scatter
+between the two plays explains the larger error. Thus the accepted error never grows, and little noise or non-repeatable
+motion is learned (De Cuyper, Linear feedback control for durability test rigs in the automotive industry, thesis, KU
+Leuven 2006).
 
 The iteration has converged when the repeatable error is small enough both as root mean square, over the whole record,
 and in the response spectrum, which is sensitive to the few cycles that excite a structure.

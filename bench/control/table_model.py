@@ -98,7 +98,8 @@ class TableModel(Parameters):
         if not timedelta(0) <= age <= longest:
             hours = longest.total_seconds() / 3600.0
             allowed = (
-                f"at {now.isoformat(timespec='seconds')} it must be at most {hours:g} h old and not later; identify the table again"
+                f"at {now.isoformat(timespec='seconds')} it must be at most {hours:g} h old, and not in the future; "
+                "identify the table again"
             )
             raise InvalidInput("date of the table model", self.date.isoformat(timespec="seconds"), allowed)
 

@@ -194,5 +194,7 @@ def _classify(item: str, annotation: Any) -> tuple[Kind, bool]:
             if issubclass(annotation, types):
                 return kind, False
     raise InvalidInput(
-        item, repr(annotation), "a recorded field must be a number, a switch or a string (or None), or an array of numbers"
+        item,
+        repr(annotation),
+        "a recorded field must be a number, a switch or a string (or None), or an array of numbers",
     )

@@ -118,7 +118,10 @@ def _table(entry: hdf5.Group, name: str) -> list[dict[str, Any]]:
 
 FINDINGS = (
     Field(
-        "number", Kind.WHOLE, "1", "number of the set, equal to the number of rows of all earlier sets; the last set is valid"
+        "number",
+        Kind.WHOLE,
+        "1",
+        "number of the set, equal to the number of rows of all earlier sets; the last set is valid",
     ),
     Field("time", Kind.REAL, "s", "bench time"),
     Field("name", Kind.TEXT, "", "name of the quantity, as in a specimen file"),

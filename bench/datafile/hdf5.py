@@ -1,7 +1,7 @@
 # pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false
 """Typed interface to the part of h5py used here; h5py publishes no types.
 
-Every numeric dataset is created by `write_numbers` or `grow_numbers`, which require its unit.
+The numeric datasets of a new file are created by `write_numbers` or `grow_numbers`, which require a unit.
 """
 
 import os
@@ -38,8 +38,8 @@ from bench.datafile.hdf5_reading import read_texts as read_texts
 
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 PAGE = 1024
-# Filters available in every HDF5 library, so that MATLAB and web viewers can read the file; measured in docs/decisions,
-# no. 10.
+# Filters that HDF5 libraries usually include, so that MATLAB and web viewers can read the file; measured in
+# docs/decisions, no. 10.
 FILTERS: dict[str, Any] = {"shuffle": True, "compression": "gzip", "compression_opts": 1}
 
 

@@ -2,7 +2,7 @@
 # pyright: reportUnknownArgumentType=false
 """Access to members and attributes through h5py's low-level interface, in a third of the time of its dictionaries.
 
-A file has some 200 objects and 600 attributes, which are created before a run starts and read whenever it is opened.
+A file has about 200 objects and 600 attributes, which are created before a run starts and read whenever it is opened.
 """
 
 from typing import Any

@@ -76,7 +76,7 @@ class File(Group, Protocol):
 
 
 class DataFileError(RockbenchError):
-    """Error raised if a file cannot be written or read; complete data written earlier remain readable."""
+    """Error raised if a data file cannot be written or read."""
 
     error_code = "data_file"
 
@@ -87,7 +87,7 @@ UNREADABLE = (OSError, RuntimeError, KeyError, ValueError, TypeError, IndexError
 
 def reason(error: BaseException) -> str:
     """One-line text for a multi-line error of the HDF5 library: the operating system's message, if the error contains
-    one.
+    one, or else the first line.
     """
     text = str(error).strip()
     found = re.search(r"error message = '([^']+)'", text)

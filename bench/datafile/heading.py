@@ -24,7 +24,7 @@ class Heading:
 
 
 def read_heading(path: Path) -> Heading:
-    """The heading of a campaign file, read in a few milliseconds without locking the file or disturbing its writer.
+    """The heading of a campaign file, read without locking the file or disturbing its writer.
 
     Raises InvalidInput for a file of another kind, and DataFileError for a file whose heading cannot be read; damage to
     other parts is not detected.

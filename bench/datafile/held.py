@@ -20,8 +20,8 @@ from pathlib import Path
 from bench.datafile.hdf5_reading import DataFileError
 
 HELD = 10.0
-"""Time for which another program, such as a virus scanner, may hold the file [s]; during this time samples are kept in
-memory.
+"""Longest time [s] for which another program, such as a virus scanner, may lock the file; samples are kept in memory
+meanwhile.
 """
 PAUSE = 0.02
 """Pause between two attempts to write [s]."""
@@ -79,7 +79,7 @@ def wait_until_free(touch: Callable[[], None], held: float | None = None) -> Non
 
 
 def is_held(error: BaseException) -> bool:
-    """Whether an error of HDF5 or of the system states that another program holds the file."""
+    """Whether an error of HDF5 or of the system indicates that another program has locked the file."""
     return getattr(error, "errno", None) == errno.EACCES or _ERRNO.search(str(error)) is not None
 
 
@@ -90,8 +90,8 @@ def in_use(error: BaseException) -> str:
 
 
 class FileSync:
-    """Flushes a file from the system's cache to the disk through a separate handle, since HDF5 does not give access to
-    its own handle on some systems. Detects changes to the file by other programs.
+    """Separate handle for flushing a file from the system's cache to the disk, since HDF5 does not give access to its
+    own handle on some systems. It also detects changes to the file by other programs.
     """
 
     def __init__(self, path: Path) -> None:

@@ -51,7 +51,7 @@ def analysis_problems(file: hdf5.File, path: Path) -> Iterator[str]:
     """Problems of a re-analysis file other than wrong checksums: missing checksums, or a changed campaign file."""
     entry = hdf5.group(file, "entry")
     if GROUP not in entry:
-        yield "the file has no checksums because an older version wrote it; repeat the analysis to write a new file"
+        yield "the file has no checksums, like files of older versions; repeat the analysis to write a new file"
     source = hdf5.group(entry, "original")
     if _original(source, path) == "changed":
         yield f"the campaign file {hdf5.read_text(source, 'file')} is not the file that was analysed"
@@ -190,8 +190,8 @@ def _of_layout(stored: hdf5.Dataset, counted: Mapping[str, int], size: int, *, c
             yield f"{path} extends beyond the end of the file: it is truncated"
         return
     length, rows = stored.shape[0], counted[part_of(path, counted)]
-    # in a file that was not closed, rows beyond the count are incomplete
+    # in a file that was not closed, rows beyond the count may be incomplete
     if length < rows or (closed and length > rows):
-        yield f"number of rows of {path}: {length}; number written: {rows}"
+        yield f"number of rows of {path}: {length}; number counted as complete: {rows}"
     if (there := intact_rows(stored, size)) < min(length, rows):
         yield f"the file has only {there} of the {rows} rows of {path}: it is truncated or damaged"

@@ -146,7 +146,9 @@ def build(file: hdf5.File, skeleton: Skeleton) -> Parts:
 def create_ends(
     entry: hdf5.Group, counted: Sequence[str]
 ) -> tuple[hdf5.Dataset, hdf5.Dataset, hdf5.Dataset, hdf5.Dataset]:
-    """Create `complete`, the row counts of `counted`, and `status`, `summary` and `end_time`, with initial values."""
+    """Create `complete`, which holds the row counts of the parts `counted`, and `status`, `summary` and `end_time`,
+    with initial values.
+    """
     complete = hdf5.write_numbers(
         entry, "complete", np.zeros(len(counted), dtype=np.int64), unit="1", description="complete rows of each part"
     )
@@ -171,7 +173,7 @@ def now() -> str:
 
 
 def software_version() -> str:
-    """The installed version of this software."""
+    """The installed version of this software, or "unknown" if it runs without installation."""
     try:
         return version("rocking-bench")
     except PackageNotFoundError:
@@ -181,6 +183,6 @@ def software_version() -> str:
 def _check_names(item: str, names: Sequence[str], taken: Sequence[str]) -> None:
     for name in names:
         if not name or "/" in name or "\0" in name or name.strip(".") == "":
-            raise InvalidInput(item, name, "a name in the file must not be empty, consist only of dots, or contain '/'")
+            raise InvalidInput(item, name, "a name in the file must not be empty, consist of dots, or contain '/' or NUL")
         if name in taken or names.count(name) > 1:
             raise InvalidInput(item, name, "this name is already used in the file")

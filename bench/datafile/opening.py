@@ -69,7 +69,7 @@ version.
 """
 
 ANALYSIS, ANALYSIS_VERSION = "rocking-bench analysis", 1
-"""Name and version of the format of a re-analysis file, stored in the folder of the campaign file."""
+"""Name and version of the format of a re-analysis file."""
 
 _VERSIONS = {FORMAT: FORMAT_VERSION, ANALYSIS: ANALYSIS_VERSION}
 _ATTEMPTS, _PAUSE = 3, 0.1

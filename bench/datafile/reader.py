@@ -130,8 +130,8 @@ class DataFile(SampleReader):
         return checksums.read(self._entry) if hdf5.has(self._entry, checksums.GROUP) else {}
 
     def integrity(self, largest: int | None = SMALL, done: Done = lambda _done, _all: None) -> Integrity:
-        """Check for changed datasets. In the result, `failing` has a line for each changed path, and `str` gives a
-        summary in one line.
+        """Check for changes since the file was written. In the result, `failing` has a line for each changed path, and
+        `str` gives a summary in one line.
 
         Reads the datasets of at most `largest` bytes, or all datasets if None. `done` receives the number of datasets
         processed and the total.
@@ -196,7 +196,8 @@ class DataFile(SampleReader):
     def columns_of(self, event: type[Event]) -> dict[str, list[Any]]:
         """Recorded events of a kind that has a table: one list per column, in the order of declaration.
 
-        An absent value is None, an unknown value NaN. Empty for an older file without this table.
+        An absent value is None, an unknown value NaN. Empty for an event without a table, and for an older file without
+        this table.
         """
         table = event_table(event)
         return {} if table is None else {field.name: values for field, values in self.growing(table.path).items()}
@@ -217,7 +218,9 @@ class DataFile(SampleReader):
         ]
 
     def growing(self, path: str) -> dict[Field, list[Any]]:
-        """The complete rows of the table at `path` below /entry, by column as declared in the file."""
+        """The complete rows of the table at `path` below /entry: the values of each field; empty if there is no such
+        table.
+        """
         if not hdf5.has(self._entry, path):
             return {}
         group = hdf5.group(self._entry, path)
@@ -274,7 +277,7 @@ class DataFile(SampleReader):
 
     @property
     def own_tables(self) -> list[str]:
-        """Paths of the tables of events that the protocol, of this or of an earlier version, declares."""
+        """Paths of the tables of the events that the protocol declared when the file was written."""
         paths = map(path_of, self.counted)
         return [each for each in paths if each not in (*TABLES, "points") and hdf5.has(self._entry, each)]
 
