@@ -45,8 +45,8 @@ FILTERS: dict[str, Any] = {"shuffle": True, "compression": "gzip", "compression_
 
 def create(path: Path) -> File:
     """Create a new file; raises FileExistsError if it exists."""
-    # metadata are written in pages of disk-sector size, so that a power failure cannot leave an item half written
-    # (measured in docs/decisions, no. 10)
+    # metadata are allocated in small pages, so that no object header crosses the border of a disk sector, where a power
+    # failure could leave it half written (measured in docs/decisions, no. 10)
     return cast(File, h5py.File(path, "x", libver=VERSIONS, locking=locking(), fs_strategy="page", fs_page_size=PAGE))
 
 

@@ -1,4 +1,4 @@
-"""The recorder, an event subscriber that writes a campaign to its data file in a thread of its own, so that a slow disk
+"""The recorder, an event subscriber that writes a campaign to its data file in a separate thread, so that a slow disk
 does not delay the drive.
 """
 
@@ -41,7 +41,8 @@ items than this wake the thread.
 """
 
 BACKLOG = 4096
-"""Maximum number of events waiting for the disk; in real time, those of several minutes. A longer backlog ends the run.
+"""Maximum number of events waiting for the disk: with blocks of 0.1 s, those of several minutes. A longer backlog ends
+the run.
 """
 
 PATIENCE = 60.0
@@ -69,11 +70,11 @@ class _End:
 
 
 class Recorder:
-    """Writes a new HDF5 file; called with each event of the engine, and closed at the end.
+    """Recorder of a new HDF5 file, called with each event of the engine and closed at the end.
 
-    Samples are on the disk within a second, journalled events almost at once. The next call after a disk error raises
-    DataFileError, once; later data are not recorded, and earlier data stay readable. A disk that is too slow causes the
-    same error; a call waits for the disk for at most `hold_up` seconds, which is non-zero only in virtual time.
+    In real time, samples are written within about a second, journalled events almost at once. The next call after a
+    disk error raises DataFileError, once; later data are not recorded, and earlier data stay readable. A disk that is
+    too slow causes the same error; a call waits for the disk for at most `hold_up` seconds, for runs in virtual time.
     `chunk_time` is the duration of a chunk of samples [s].
 
     `metadata` is stored as strings under /entry/metadata, `tables` (such as {"prediction": ...}) under /entry. `events`

@@ -1,4 +1,4 @@
-"""Recovery of a valid file from one that has an old format, was truncated, or whose writer was killed or ran out of
+"""Recovery of a valid file from one that has an old format or was truncated, or whose writer was killed or ran out of
 disk space.
 
 The original is not changed. The copy contains the intact data in the current layout, with checksums.
@@ -36,11 +36,11 @@ Row = Mapping[str, Any]
 
 
 def add_lost_events(entry: hdf5.Group, lines: Sequence[Row]) -> tuple[int, int]:
-    """Append the rows that only the journal contains to the tables of events, of points and of single types of event.
+    """Append the rows that only the journal contains to the tables of events, of points and of individual event types.
     Returns the numbers of added events and points.
 
     Points are checked separately, because a point can be missing although its event is present. Raises DataFileError,
-    without appending, if the journal is damaged or differs from the stored rows because it is that of another file.
+    without appending, if the journal is damaged or differs from the stored rows, as that of another file would.
     """
     points = [line["point"] for line in lines if "point" in line]
     events = _beyond(hdf5.group(entry, "events"), lines, ("time", "kind"))
@@ -77,7 +77,7 @@ def _beyond(
             # JSON has no NaN or infinity: a number missing from the journal therefore counts as equal
             same = (early == known[: len(early)]) | ((early != early) if early.dtype.kind == "f" else False)
             if not np.all(same):
-                raise DataFileError(f"journal and file differ in {stored.name}: the journal is that of another file")
+                raise DataFileError(f"journal and file differ in {stored.name}: the journal may be that of another file")
         new.append((stored, values[len(known) :]))
     return new
 
@@ -113,10 +113,10 @@ class Recovery:
 
 
 def write_ends(record: DataFile, path: Path, entry: hdf5.Group, lengths: Mapping[str, int], loss: str) -> None:
-    """Write row counts, status, summary and end time: those of the original or, if it was not closed or lost data,
-    values that state the reason.
+    """Write the row counts `lengths` by part, and status, summary and end time: those of the original or, if it was not
+    closed or lost data, values that state this.
 
-    `lengths` is the number of rows of each part; `loss` describes the missing data.
+    `loss` describes the missing data.
     """
     complete, status, summary, end_time = create_ends(entry, tuple(record.counted))
     complete[...] = [lengths.get(name, 0) for name in record.counted]

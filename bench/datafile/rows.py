@@ -17,7 +17,7 @@ THREADS = 2
 
 
 class Packer:
-    """Appends to compressed datasets; several chunks are compressed in parallel threads, which start on demand."""
+    """Writer of compressed datasets; several chunks are compressed in parallel threads, which start on demand."""
 
     def __init__(self) -> None:
         self._pool = ThreadPoolExecutor(THREADS, "record packer")
@@ -51,7 +51,7 @@ def pack(chunks: NDArray[Any]) -> list[bytes]:
 
     Each result is padded with zeros, which decoders ignore after the end of the stream, to a whole number of pages of
     the file or to a half, a quarter ... of a page. HDF5 would otherwise keep a description of each unused remainder of
-    a page in memory until the file is closed: 260 bytes per chunk, 9 MB per hour.
+    a page in memory until the file is closed: 260 bytes per chunk.
     """
     n, size = len(chunks), chunks.dtype.itemsize
     shuffled = np.ascontiguousarray(chunks).view(np.uint8).reshape(n, -1, size).transpose(0, 2, 1)
@@ -65,12 +65,12 @@ def _allocated(size: int) -> int:
 
 
 class Growing:
-    """Appends rows to a dataset and updates its checksum, so that the rows need not be read again at the end of a long
-    run.
+    """A growing dataset, whose checksum is updated with every append, so that its rows need not be read again at the
+    end of a long run.
     """
 
     def __init__(self, stored: hdf5.Dataset, packer: Packer | None = None) -> None:
-        """`packer` compresses and writes complete chunks."""
+        """`packer`, if given, compresses and writes the appended rows."""
         self._stored, self.path = stored, stored.name
         self._packer = packer
         self._digest = sha256()

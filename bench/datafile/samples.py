@@ -91,8 +91,8 @@ CHUNK_TIME = 0.5
 """Duration of a chunk of samples [s]; in a real-time run, the longest time for which samples are buffered."""
 
 VIRTUAL_CHUNK_TIME = 2.0
-"""Duration of a chunk of samples in virtual time [s], which is about a hundred times faster than real time: compressing
-larger chunks takes half the time.
+"""Duration of a chunk of samples in virtual time [s], which can be a hundred times faster than real time: compressing
+these larger chunks takes about half the time.
 """
 
 
@@ -161,7 +161,7 @@ def read_channels(instrument: hdf5.Group) -> tuple[Channel, ...]:
 
 
 def read_channel(instrument: hdf5.Group, name: str) -> Channel:
-    """Reads the conversion and valid range of channel `name`. Raises DataFileError if they are damaged."""
+    """The channel `name`, with its conversion and valid range. Raises DataFileError if they are damaged."""
     stored = hdf5.dataset(instrument, f"{name}/counts")
     with reading(f"the conversion of {stored.name}"):
         attrs = stored.attrs

@@ -75,7 +75,7 @@ ALL = slice(None)
 
 
 class SampleReader:
-    """The samples of an open file. Everything is read on access."""
+    """The samples of an open file, read on access."""
 
     def __init__(self, entry: hdf5.Group) -> None:
         self._entry = entry

@@ -2,7 +2,7 @@
 # pyright: reportUnknownArgumentType=false
 """Validation of the structure of an untrusted file before its contents are read.
 
-Values, link targets and external storage are not accessed. Reading the structures that are rejected here would take
+Values, link targets and external storage are not accessed. Reading the structures that are rejected here could take
 hours, exhaust the memory, crash the process, or open other files.
 """
 
@@ -40,7 +40,7 @@ KINDS = frozenset("iufSb")
 
 
 class _Judge:
-    """Checks the objects of a file of `size` bytes and counts them and their values."""
+    """Check of the objects of a file of `size` bytes, which also counts them and their values."""
 
     def __init__(self, size: int) -> None:
         self._size = size
@@ -108,7 +108,7 @@ class _Judge:
         if not known or dtype.itemsize > LARGEST_VALUE or dtype.subdtype is not None:
             raise DataFileError(f"{path} has values of type {dtype!s:.40}, which this program never writes")
         if len(stored.shape) > 2 or stored.id.get_space().get_simple_extent_type() == h5py.h5s.NULL:
-            raise DataFileError(f"{path} has the shape {stored.shape}; a table has one or two dimensions")
+            raise DataFileError(f"{path} has the shape {stored.shape}; at most two dimensions are allowed")
         if made.get_layout() == h5py.h5d.VIRTUAL:
             self._view(made, path)
             return
@@ -138,7 +138,7 @@ class _Judge:
 
 
 def check_attributes(owner: Any, path: str) -> None:
-    """Raise DataFileError if there are more or larger attributes than this program writes."""
+    """Raise DataFileError if there are more or larger attributes than are allowed."""
     if (count := h5py.h5a.get_num_attrs(owner.id)) > MOST_ATTRIBUTES:
         raise DataFileError(f"{path} has {count} attributes; at most {MOST_ATTRIBUTES} are allowed")
     for number in range(count):
