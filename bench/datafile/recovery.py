@@ -77,7 +77,9 @@ def _beyond(
             # JSON has no NaN or infinity: a number missing from the journal therefore counts as equal
             same = (early == known[: len(early)]) | ((early != early) if early.dtype.kind == "f" else False)
             if not np.all(same):
-                raise DataFileError(f"journal and file differ in {stored.name}: the journal may be that of another file")
+                raise DataFileError(
+                    f"journal and file differ in {stored.name}: the journal may be that of another file"
+                )
         new.append((stored, values[len(known) :]))
     return new
 

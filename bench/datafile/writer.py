@@ -1,4 +1,4 @@
-"""Writer of a campaign file. The file can be read at any time and survives a crash of the writer."""
+"""Writer of a campaign file, which can be read while it is being written and after a crash of the writer."""
 
 import json
 import os
@@ -39,7 +39,9 @@ def journal_path(path: Path) -> Path:
 
 
 class JournalWriter:
-    """Appends to a new journal. Raises FileExistsError if it exists, and OSError when the disk fails."""
+    """Writer of a new journal. The constructor raises FileExistsError if it exists, and every method raises OSError if
+    the disk fails.
+    """
 
     def __init__(self, path: Path) -> None:
         self._handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
@@ -97,9 +99,9 @@ def _check_folder(folder: Path) -> None:
 
 
 class DataFileWriter:
-    """Creates the file and its journal, and appends to them.
+    """Writer of a new file and its journal.
 
-    If the disk fails, the methods raise h5py's exceptions, mostly OSError. The constructor raises InvalidInput if one
+    If the disk fails, the methods raise h5py's exceptions, mostly OSError, or DataFileError. The constructor raises InvalidInput if one
     of the files exists or cannot be created, or if the skeleton has contents that cannot be stored, and DataFileError
     if the disk fails during creation.
     """
@@ -228,7 +230,7 @@ class DataFileWriter:
         wait_until_free(self._file_sync.touch)
         self._file.close()
         if whole := len(self._parts.rows["fits"]):
-            # the data are complete without the views; if another program has locked the file, a recovery adds them
+            # the data are complete without the views; if another program has locked the file, a recovery can add them
             # later
             with suppress(OSError, RuntimeError), hdf5.open_to_extend(self._path) as file:
                 add_fit_views(hdf5.group(file, "entry"), whole)

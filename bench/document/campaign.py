@@ -67,7 +67,7 @@ class Campaign:
 
     @cached_property
     def amplitude_factor(self) -> float:
-        """Amplitude of the sine divided by g/lambda; that of the paper if the file has no sine."""
+        """Amplitude of the sine divided by g/lambda; that of the paper if the protocol has no such parameter."""
         factor = self.parameters.get("amplitude_factor")
         return float(factor) if isinstance(factor, int | float) else AMPLITUDE_FACTOR
 

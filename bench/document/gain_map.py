@@ -19,7 +19,7 @@ ranges.
 """
 
 MOST = 20_000
-"""Maximum number of points of a map."""
+"""Number of points to which a map is limited, approximately."""
 
 
 def map_section(specimen: Specimen, amplitude_factor: float, measured: Sequence[MapPoint] = ()) -> Section:
@@ -43,15 +43,15 @@ def map_section(specimen: Specimen, amplitude_factor: float, measured: Sequence[
     text = (
         f"Steady motions under a sine of {amplitude:.4g} m/s² ({amplitude_factor:g} g/λ), computed as "
         f"periodic orbits at {len(request.omega)} frequencies by {len(request.beta)} stiffnesses, with their "
-        "stability. Where the block may rest, two steady motions exist, and the start of a test determines "
-        "which one is reached. In the hatched areas the rocking motion is unstable: a test shows a modulated "
-        "motion, or the block topples."
+        "stability. Where the block may rest, two steady motions can exist, and the start of a test determines "
+        "which one is reached. In the hatched areas the rocking motion is unstable: a test can lead to a "
+        "modulated motion or to rest, or topple the block."
     )
     parts: list[Part] = [text]
     if lost:
         parts.append(f"Number of blank points, at which no rocking orbit was found: {lost}.")
     found = " Circles are measured points with their α₂." if measured else ""
-    description = "Surfaces and contour maps of alpha 1 and alpha 2 over frequency and stiffness ratio."
+    description = "Surfaces and contour maps of alpha 1 and alpha 2 against frequency and stiffness ratio."
     parts.append(Picture(figure, f"Gain surfaces (a) and maps (b, c) of α₁ and α₂, predicted.{found}", description))
     return Section("map", "Gain surface and map (as in Fig. 4 of the paper)", parts)
 

@@ -32,10 +32,10 @@ from sim.specimen import Specimen
 
 
 class Engine:
-    """Runs the acquisition loop: sends the drive through the guard and returns the signals to the plan.
+    """Engine of a bench: sends the drive through the guard and returns the signals to the plan.
 
-    `block` is the number of samples per iteration; `guard` must have a signal map. `run` leaves the output at zero
-    on every path. A request to halt cuts the enable line in the requesting thread, even while the loop waits.
+    `block` is the number of samples per iteration; `guard` must have a signal map. On every path, `run` ramps the
+    output to zero or cuts the enable line. A request to halt cuts the enable line in the requesting thread, even while the loop waits.
     """
 
     def __init__(
@@ -66,8 +66,8 @@ class Engine:
     def run(self, plan: Plan) -> Ending:
         """Run `plan` to its end, or until a request, an exceeded limit or an error ends it. Returns the ending.
 
-        An error of the rig, data file, plan or analysis is returned as an ending. After any other error, the enable
-        line is cut and the error is raised again.
+        A RockbenchError of the rig, data file, plan or analysis, or a lack of memory, is returned as an ending. After
+        any other error, the enable line is cut and the error is raised again.
         """
         ending_of = self._output.ending_of
         try:

@@ -163,7 +163,8 @@ class Requests:
 
 
 class EventStream:
-    """Stamps events with the bench time since the start of the session [s] and calls the subscribers in order.
+    """Stream that stamps events with the bench time since the start of the session [s] and passes them to the
+    subscribers in order.
 
     `stores` returns whether the data file stores the columns of a type of event; the first event of a type that it does
     not store causes a warning.

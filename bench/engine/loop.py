@@ -38,8 +38,8 @@ from sim.specimen import Specimen
 
 
 class Loop:
-    """Exchanges blocks until a request or an exceeded limit ends the run; then raises `Ended`, with the output at
-    zero.
+    """Acquisition loop, which exchanges blocks until a request or an exceeded limit ends the run. `Ended` is then
+    raised, with the output at zero.
     """
 
     def __init__(self, output: Output, guard: Guard, stream: EventStream, requests: Requests) -> None:
@@ -148,7 +148,7 @@ class AtRest:
         """Whether the laser of storey 2 is aimed at its storey, so that the difference of the lasers is the drift."""
 
     def arm(self, step: Arm, specimen: Specimen | None) -> None:
-        """Arm, wait until the storeys are still, and tare every signal."""
+        """Arm, wait until the storeys are still or the patience is exhausted, and tare the signals."""
         self._loop.begin("start of a test")
         rest = self._stillness(step)
         self._guard.tare(rest, drift=self.measures_storeys)
@@ -264,7 +264,7 @@ Array = NDArray[np.float64]
 
 
 class PreparedDrive:
-    """Plays a prepared drive through the guard, block by block."""
+    """Playback of a prepared drive through the guard, block by block."""
 
     def __init__(self, loop: Loop, guard: Guard, stream: EventStream) -> None:
         self._loop, self._guard, self._stream = loop, guard, stream

@@ -111,7 +111,7 @@ class DriveSource:
 
 
 class Alignments:
-    """Publishes, once per run, the alignment of free-running sensors to the sample clock."""
+    """Publication of the values of free-running sensors and, once per run, of their alignment to the sample clock."""
 
     def __init__(self, rig: Rig, stream: EventStream) -> None:
         self._rig, self._stream = rig, stream
@@ -170,8 +170,7 @@ class Output:
         self.stalled = 0.0
         """Longest time during the last exchange in which the program did not run [s]."""
         self._exchanged = now()
-        # not written to: reserved addresses already count towards a memory limit, and writing 32 MB takes as long as a
-        # hundred loop iterations
+        # not written to: reserved addresses already count towards a memory limit, and writing 32 MB takes time
         self._reserve: NDArray[np.uint8] | None = np.empty(RESERVE, dtype=np.uint8)
 
     @property
@@ -250,7 +249,7 @@ class Output:
                 self.machine.go(State.HALTED, ending.reason, ending.cause)
             except RockbenchError as error:
                 ending = ending.then(Ending.failed(error))
-        # report the original cause, not a consequential one
+        # report the original cause, not a consequential error
         with suppress(RockbenchError):
             self._alignments.publish()
         return ending
