@@ -1,7 +1,7 @@
 """Events of a run, each declared once with its columns in the data file, its journal line and its label in the log.
 
-The recorder, the live analysis, the console and the window are subscribers: functions that the engine calls with each
-event, in its own thread and in the order of subscription. A subscriber must therefore queue long computations.
+The recorder, the live analysis, the console and the window are subscribers: functions called with each event in the
+engine's thread, in the order of subscription. A subscriber must therefore queue long computations.
 """
 
 from collections.abc import Callable, Mapping
@@ -210,7 +210,7 @@ class LimitExceeded(Event):
 
 @event(table="operator_requests", notice="asked")
 class OperatorAsked(Event):
-    """The plan waits for the operator. `request` is the requested action with its reason, `work` its kind, if known."""
+    """The plan waits for the operator. `request` describes the requested action; `work` is its kind, if known."""
 
     request: str
     work: OperatorTask | None = column("", "kind of the requested action; empty if unknown", default=None)

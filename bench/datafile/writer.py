@@ -101,9 +101,9 @@ def _check_folder(folder: Path) -> None:
 class DataFileWriter:
     """Writer of a new file and its journal.
 
-    If the disk fails, the methods raise h5py's exceptions, mostly OSError, or DataFileError. The constructor raises InvalidInput if one
-    of the files exists or cannot be created, or if the skeleton has contents that cannot be stored, and DataFileError
-    if the disk fails during creation.
+    If the disk fails, the methods raise h5py's exceptions, mostly OSError, or DataFileError. The constructor raises
+    InvalidInput if one of the files exists or cannot be created, or if the skeleton has contents that cannot be stored,
+    and DataFileError if the disk fails during creation.
     """
 
     def __init__(self, path: Path, skeleton: Skeleton) -> None:

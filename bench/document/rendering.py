@@ -28,8 +28,9 @@ _RULE = re.compile(r"<defs>\s*<style.*?</style>\s*</defs>\s*", re.DOTALL)
 _OPENING = re.compile(r"<svg\b([^>]*)>")
 
 WIDTH, HEIGHT = 6.77, 8.0
-"""Largest size of a figure in a PDF [in]: the text area of an A4 page minus a heading, a paragraph and a caption of a few lines each, so
-that a section with one large figure fits on a page."""
+"""Largest size of a figure in a PDF [in]: the text area of an A4 page minus a heading, a paragraph and a caption of a
+few lines each, so that a section with one large figure fits on a page.
+"""
 
 
 def html_page(document: Document) -> str:

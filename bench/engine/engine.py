@@ -35,7 +35,8 @@ class Engine:
     """Engine of a bench: sends the drive through the guard and returns the signals to the plan.
 
     `block` is the number of samples per iteration; `guard` must have a signal map. On every path, `run` ramps the
-    output to zero or cuts the enable line. A request to halt cuts the enable line in the requesting thread, even while the loop waits.
+    output to zero or cuts the enable line. A request to halt cuts the enable line in the requesting thread, even while
+    the loop waits.
     """
 
     def __init__(

@@ -17,8 +17,8 @@ class Stalls:
     """Context manager that runs a thread which repeatedly sleeps for a short time. A sleep that ends much too late
     reveals a stall.
 
-    A slow call, a slow disk or a long computation in another thread does not delay this thread; a stopped or suspended
-    process, a computer without free processors, or exhausted memory does.
+    A slow call, a slow disk or a long computation in another thread does not normally delay this thread; a stopped or
+    suspended process, a computer without free processors, or exhausted memory does.
     """
 
     def __init__(self) -> None:

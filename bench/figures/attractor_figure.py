@@ -17,8 +17,8 @@ COLUMNS = 2
 
 
 def attractor_figure(points: Mapping[str, NDArray[Any]], gains: Sequence[NDArray[np.float64]]) -> "Figure":
-    """Gains of long-term motions against frequency. A dot is the peak of a cycle; the line is the orbit, dashed where
-    it is unstable on the shake table.
+    """Gains of long-term motions against frequency. The line is the orbit, dashed where it is unstable; there, dots are
+    the peaks of cycles, and a cross marks a motion in which the block falls.
 
     `points` are the columns of the table from `bench.prediction.attractors`; `gains` are those of the last cycles of
     the motion in each row of the table, empty after a fall.

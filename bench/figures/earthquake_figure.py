@@ -58,11 +58,12 @@ class DriftPicture:
 
 
 def gain_figure(points: Sequence[PointLike], prediction: Mapping[str, NDArray[Any]]) -> "Figure":
-    """alpha_2 against beta, one panel per record.
+    """Measured and predicted alpha_2 against beta, one panel per record.
 
     `points` have the fields of an earthquake point; `prediction` has record, beta and alpha_2 under the requested
-    motion (NaN where the block topples, marked by a short stroke). A wide bar is the 95 % interval expected for the
-    measured value; a cross near the upper edge marks a point without a gain, with its status.
+    motion (NaN where the block topples, marked by a short stroke). A horizontal mark is the prediction for the achieved
+    motion, a wide bar the 95 % interval expected for the measured value; a cross near the upper edge marks a point
+    without a gain, with its status.
     """
     rows = plain(points)
     names = list(dict.fromkeys([str(name) for name in prediction["record"]] + [str(row["record"]) for row in rows]))
@@ -87,7 +88,7 @@ def gain_figure(points: Sequence[PointLike], prediction: Mapping[str, NDArray[An
 
 
 def motion_figure(motions: Sequence[MotionPicture]) -> "Figure":
-    """Table accelerations: one row per record."""
+    """Requested and achieved table accelerations and their difference: one row per record."""
     figure, panels = _rows(len(motions))
     for panel, motion in zip(panels, motions, strict=False):
         time = motion.dt * np.arange(motion.asked.size)
@@ -102,7 +103,9 @@ def motion_figure(motions: Sequence[MotionPicture]) -> "Figure":
 
 
 def drift_figure(drifts: Sequence[DriftPicture]) -> "Figure":
-    """Drifts, one row per record: bare frame, and frame with the softest spring for which there is a history."""
+    """Measured and predicted drifts, one row per record: bare frame, and frame with the softest spring for which there
+    is a history.
+    """
     names = list(dict.fromkeys(drift.name for drift in drifts))
     figure, panels = _rows(len(names))
     for panel, name in zip(panels, names, strict=False):
@@ -219,7 +222,7 @@ def _finish(figure: "Figure", panels: "Sequence[Axes]", count: int) -> None:
         panels[0].text(0.5, 0.5, "no record was played", ha="center", va="center")
         return
     panels[-1].set_xlabel(r"$t$  [s]", fontsize=8)
-    # from all panels, because curves are missing for a record that toppled the block or was not played
+    # from all panels, because curves may be missing for a record that toppled the block or was not played
     labels = {label for panel in panels[:count] for label in panel.get_legend_handles_labels()[1]}
     add_legend(figure, panels[:count], len(labels) if len(labels) < 4 else 2)
 

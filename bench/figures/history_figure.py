@@ -22,8 +22,9 @@ WIDTH, ROW, MARGIN = 9.0, 2.0, 0.9
 class Motion:
     """A motion and its time histories.
 
+    omega, beta : frequency of the sine [rad/s] and stiffness ratio.
     name : start of the motion, or kind of steady motion.
-    status : how the motion ended.
+    status : outcome of the motion; may be empty.
     values : time_s, drift_m, bare_drift_m, u1_m and theta_rad, each of shape (n,); NaN after a fall.
     """
 
@@ -83,7 +84,7 @@ def _draw_block(panel: "Axes", motion: Motion) -> "Axes":
 
 
 def _before_the_fall(motion: Motion) -> NDArray[np.float64]:
-    """Angles that set the scale of the panel: all or, before a fall, those up to the last sign change, times 1.6."""
+    """Angles that set the scale of the panel: all or, if the block fell, 1.6 times those up to the last sign change."""
     theta = motion.values["theta_rad"]
     if np.isfinite(theta).all():
         return theta

@@ -1,5 +1,6 @@
 # pyright: reportUnknownMemberType=false
-"""Gain surfaces and maps as in Fig. 4 of the paper, for the rocking and, where it exists, the resting motion."""
+"""Gain surfaces of the rocking motion, and maps of it and of the resting motion if it exists, as in Fig. 4 of the paper.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -85,7 +86,7 @@ def map_figure(
     resting_margin: Floats,
     measured: Sequence[MapPoint] = (),
 ) -> "Figure":
-    """Surfaces (a), map of the rocking motion (b) and map of the resting motion (c), for alpha_1 and alpha_2.
+    """Surface (a) and map (b) of the rocking motion, and map of the resting motion (c), for alpha_1 and alpha_2.
 
     `omegas` [rad/s], shape (m,), and `betas`, shape (n,), are ascending. `resting_margin`, shape (n, m), is positive
     where the block may rest. `measured` points are drawn on the surface and the maps of alpha_2, each on its branch.
