@@ -56,7 +56,8 @@ class FittedParameter:
 
 @event(notice="fit", eq=False)
 class FitFinished(Event):
-    """A model was fitted to a section of a recording; `name` is short and unique within a session, `text` is one line.
+    """A model was fitted to a section of a recording; `name` should be short and unique within a session, `text` is one
+    line.
 
     `columns` holds series of equal length by name: first the axis (such as time), then the measured values and, for
     comparison, the fitted values, residuals and so on. Raises ValueError for series of unequal length, and for a name

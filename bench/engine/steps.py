@@ -36,8 +36,7 @@ class Arm:
     """Arm the rig with the output at zero, wait until the storeys are still, and tare the signals.
 
     The storeys are still when the standard deviations of u1 and the drift over `rest` seconds are at most `still` [m].
-    After `patience` seconds the signals are tared regardless, with a warning. The drift is not tared while laser 2 is
-    not aimed at its storey.
+    After `patience` seconds the signals are tared regardless, with a warning.
     """
 
     rest: float

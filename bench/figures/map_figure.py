@@ -1,6 +1,5 @@
 # pyright: reportUnknownMemberType=false
-"""Gain surfaces of the rocking motion, and maps of it and of the resting motion if it exists, as in Fig. 4 of the paper.
-"""
+"""Gain surfaces of the rocking motion, and maps of the rocking and any resting motion, as in Fig. 4 of the paper."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -100,7 +100,7 @@ def record_figure(records: Sequence[RecordPicture]) -> "Figure":
 
 
 def stroke_figure(title: str, histories: Sequence[History], spectra: Spectra, reach: tuple[float, float]) -> "Figure":
-    """Histories on the left, response spectra on the right. The first of `histories` is the motion before the fit;
+    """Histories on the left, response spectra and their changes on the right. The first of `histories` is the motion before the fit;
     `reach` is the allowed displacement [m] and velocity [m/s].
     """
     figure = new_figure(FIT_WIDTH, FIT_HEIGHT)
@@ -179,7 +179,7 @@ def _draw_history(panel: "Axes", values: Array, dt: float, colour: str) -> None:
 
 
 def _drawn_points(values: Array, dt: float) -> tuple[Array, Array]:
-    """Time and values of the drawn points, shape (k,); keeps every peak."""
+    """Time and values of the drawn points, shape (k,); keeps the extremes of every interval."""
     time: Array = dt * np.arange(values.size, dtype=np.float64)
     if values.size <= MOST_POINTS:
         return time, values

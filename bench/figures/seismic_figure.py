@@ -45,8 +45,8 @@ PANELS, PANELS_WIDTH, PANEL_HEIGHT = 3, 9.5, 2.5
 """Panels per row; width of the figure and height of a row [inch]."""
 
 TOPPLED, LOWER, HEADROOM = 0.96, 0.06, 0.3
-"""Height of the marks for a toppled block, their offset for each further stiffness, and the space reserved for them,
-relative to the height of the panel.
+"""Height of the marks for a toppled block and their offset for each further stiffness, relative to the height of the
+panel, and the space reserved for them, relative to the largest gain.
 """
 
 

@@ -44,8 +44,7 @@ LEGEND = (
 
 HEADROOM = 1.35
 FLOOR, CEILING = 0.01, 20.0
-"""Limits beyond which predicted gains do not extend the axis, because no bench can measure such small or large gains.
-"""
+"""Limits beyond which predicted gains do not extend the axis."""
 
 Prediction = Mapping[str, NDArray[Any]]
 """Arrays of equal length: omega [rad/s], beta, alpha_2, stable (Booleans), layer (branch: "rocking" or "resting"), and
@@ -54,8 +53,7 @@ optionally the band of alpha_2: alpha_2_low, alpha_2_high.
 
 
 def gain_spectra(points: Sequence[PointLike], prediction: Prediction, *, title: str = "") -> "Figure":
-    """Gain (logarithmic) against frequency.
-
+    """Predicted and measured gains on a logarithmic axis against frequency, one panel per stiffness.
     `points` have the fields of a harmonic point. A point without a gain is drawn as a cross near the upper edge, with
     its status.
     """

@@ -64,7 +64,7 @@ def set_grid(panel: "Axes") -> None:
 
 
 def centre(panel: "Axes", *curves: NDArray[np.float64]) -> None:
-    """Centre the vertical axis at zero, with a margin beyond the largest magnitude of the curves."""
+    """Centres the vertical axis at zero, with a margin beyond the curves' largest magnitude."""
     finite = np.concatenate([curve[np.isfinite(curve)] for curve in curves])
     reach = HEADROOM * float(np.abs(finite).max(initial=0.0)) or 1.0
     panel.set_ylim(-reach, reach)

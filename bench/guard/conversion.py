@@ -23,7 +23,7 @@ class Extremes:
 
 
 class Conversion:
-    """Converts blocks of counts, all channels at once if all are linear and no sample is missing."""
+    """Conversion of blocks of counts, of all channels at once if all are linear and no sample is missing."""
 
     def __init__(self, channels: tuple[Channel, ...]) -> None:
         self._channels = channels

@@ -2,7 +2,7 @@
 
 The guard owns the rig's output. It refuses commands beyond the limits, checks the measured motion within the
 acquisition loop, and ends a run in three ways: *stop* (smooth ramp), *abort* (fast ramp), *halt* (enable line cut
-now). Once a ramp has begun, nothing can raise the output until the guard is armed again.
+now). Once a ramp has begun, the factor on the commands can only fall until the guard is armed again.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -48,7 +48,7 @@ class Exchange:
 
 
 class Guard:
-    """Checks commands and measured samples between the engine and the rig.
+    """Check of commands and measured samples, between the engine and the rig.
 
     A `shaker` model estimates force and current from the motion where no channel measures them. With `signals`, each
     block is converted to signals once, and the guard also checks the drift and those `further` channels that have a

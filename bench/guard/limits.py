@@ -16,8 +16,8 @@ _PERSISTENCE = "time for which the limit must be exceeded before it trips"
 
 
 DEBOUNCE = (1e-3, 0.05)
-"""Usual debounce of a limit [s]: longer than a single spike, shorter than the time in which the table moves from a
-limit to the end of its stroke.
+"""Usual debounce of a limit [s]: typically longer than a single spike, and shorter than the time in which the table
+moves from a limit to the end of its stroke.
 """
 
 
@@ -94,7 +94,7 @@ class Limits(Parameters):
         (),
         "",
         "limits that cut the enable line at once instead of ramping the drive to zero after the queued samples: this"
-        " acts sooner by acquisition.lead, but the amplifier then brakes the table harder than limits.acceleration",
+        " acts sooner by acquisition.lead, but the amplifier may then brake the table harder than limits.acceleration",
         example=["displacement"],
     )
     warning: Warnings = Warnings()
@@ -159,7 +159,8 @@ def amount(value: float, unit: str) -> str:
 class Persistence:
     """Counter that rises by one with each bad sample and falls by one with each good one, never below zero.
 
-    An intermittent condition still reaches the limit; a single spike does not.
+    A condition present in more than half of the samples reaches the limit in time, even if it is intermittent; a spike
+    of fewer samples than the limit does not.
     """
 
     def __init__(self, samples: int) -> None:

@@ -39,7 +39,7 @@ _MEASURED_BY = {
 """Channel that measures each quantity directly; a limit beyond its range could never trip."""
 
 _OF_TABLE = frozenset({"displacement", "velocity", "acceleration", "force", "current"})
-"""Quantities of the table itself, which vanish once the drive is zero."""
+"""Quantities of the table itself, which should vanish once the drive is zero."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class ChannelLimit:
 
 
 class MotionWatch:
-    """Checks blocks of values against the limits. Channels are found by name; absent ones are not checked.
+    """Check of blocks of values against the limits. Channels are found by name; absent ones are not checked.
 
     `further` are the limits on the signals of further channels. Raises InvalidInput for a limit that its channel cannot
     measure.
@@ -121,7 +121,7 @@ class MotionWatch:
         if self.drift_watched:
             sizes["drift"] = np.abs(np.nan_to_num(signals[:, DRIFT]))
         for each in self._further:
-            # a missing value means that the converter is saturated
+            # a missing value counts as beyond every limit, because the converter is then probably saturated
             sizes[each.name] = np.nan_to_num(np.abs(signals[:, each.column]), nan=np.inf)
         peaks = {key: float(np.max(size, initial=0.0)) for key, size in sizes.items()}
         self._latest = values, peaks
