@@ -100,8 +100,8 @@ def record_figure(records: Sequence[RecordPicture]) -> "Figure":
 
 
 def stroke_figure(title: str, histories: Sequence[History], spectra: Spectra, reach: tuple[float, float]) -> "Figure":
-    """Histories on the left, response spectra and their changes on the right. The first of `histories` is the motion before the fit;
-    `reach` is the allowed displacement [m] and velocity [m/s].
+    """Histories on the left, response spectra and their changes on the right. The first of `histories` is the motion
+    before the fit; `reach` is the allowed displacement [m] and velocity [m/s].
     """
     figure = new_figure(FIT_WIDTH, FIT_HEIGHT)
     grid = figure.add_gridspec(6, 2, width_ratios=[3.0, 2.0])

@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 
 VELOCITY_WINDOW = 0.02
 """Interval of the difference quotient for the velocity [s]: long enough to suppress noise, short compared with the
-motion.
+usual periods of the motion.
 """
 
 MOST_SKIPPED = 4000
@@ -26,9 +26,9 @@ ROUNDING = 1e-9
 
 
 class WatchedQuantities:
-    """Converts blocks of channel values into magnitudes of the limited quantities.
+    """Conversion of blocks of channel values to magnitudes of the limited quantities.
 
-    A missing value of a table channel counts as infinite, because its converter is saturated. A missing value of a
+    A missing value of a table channel counts as infinite: its converter is probably saturated. A missing value of a
     laser is ignored here; `bench.guard.sensors` checks for the loss of a sensor.
 
     A block is either converted by `of` or skipped: `bounds` returns upper bounds of its magnitudes, and `skip` stores
@@ -102,7 +102,7 @@ class WatchedQuantities:
 
     def displayed(self, values: Array, magnitudes: Mapping[str, float]) -> dict[str, float]:
         """Magnitudes of a block for display: the current itself instead of its bound, the heating at its last update,
-        at most `MOST_SKIPPED` samples ago, and the position of each laser within its range instead of the largest one.
+        about `MOST_SKIPPED` samples ago at most, and the position of each laser within its range instead of the largest one.
         """
         found = {key: value for key, value in magnitudes.items() if key != "laser_range"}
         if "current" in found and (current := self._load(values)[1]) is not None:

@@ -91,7 +91,7 @@ class SensorWatch:
             self._driven_samples -= self._drives.popleft().size
 
     def _driven(self) -> bool:
-        """Whether the drive changed by more than `_DRIVEN` in both halves of the last `_needed` samples.
+        """Whether the drive changed by more than `_DRIVEN` times its limit in both halves of the last `_needed` samples.
 
         Near its peaks, a slow drive hardly changes within a single block.
         """
@@ -104,7 +104,7 @@ class SensorWatch:
 
 
 _SETTLED = 20.0
-"""Time before two clocks are compared [s], long compared with the delay of a block."""
+"""Time in a run before the two clocks are compared [s], long compared with the delay of a block."""
 _STRETCH = 5.0
 """Length [s] of the windows at the start of a run and at its current end; the least delayed blocks of the two are
 compared.

@@ -12,7 +12,7 @@ Motion = TypeVar("Motion", float, NDArray[np.float64], NDArray[np.complex128])
 
 @dataclass(frozen=True)
 class ShakerModel:
-    """Estimates force and current where no channel measures them.
+    """Model that estimates force and current from the motion.
 
     `mass` is the mass of everything that moves with the table, including the specimen [kg], `stiffness` the stiffness
     of the suspension [N/m], and `force_constant` the force constant of the coil [N/A].
@@ -48,8 +48,8 @@ class ShakerModel:
 def exponential_mean(values: Array, forget: float, state: Array | None = None) -> tuple[Array, Array]:
     """Exponential running mean of `values`, shape (n,), starting at zero, and the filter state for the next call.
 
-    `forget` is the weight of the past per sample. The root of the mean squared current follows the temperature of the
-    coil.
+    `forget` is the weight of the past per sample. The mean of the squared current approximately follows the temperature
+    rise of the coil.
     """
     from sim.kernel.filter import exponential_mean as kernel
 

@@ -39,7 +39,7 @@ class LongTerm:
     does not repeat, or if the block falls. `gains`, shape (n,), are the gains of the peaks of the last cycles; the
     array is empty if the block falls, which happens after `fallen` cycles. `low` and `high` enclose the gains of the
     greatest peaks for 95 % of the drawn specimens whose block does not fall, and `falls` is the fraction of specimens
-    whose block falls; all three are NaN without drawn specimens.
+    whose block falls; all three are NaN without drawn specimens, `low` and `high` also if every block falls.
     """
 
     omega: float

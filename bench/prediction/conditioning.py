@@ -1,8 +1,8 @@
 """Condition of a motion from rest: its sensitivity to its inputs, and the error of its computation.
 
-A sine barely above the uplift acceleration starts a motion whose relative changes are millions of times those of the
-inputs. The uncertainty of the inputs then limits the valid digits of the motion long before the integration does.
-Therefore both are stated: the condition number, and the error of the computation.
+A sine barely above the uplift acceleration can start a motion whose relative changes are millions of times those of the
+inputs. The uncertainty of the inputs then limits the valid digits of the motion long before the integration does. The
+condition number and the error of the computation are therefore both stated.
 """
 
 from collections.abc import Iterator
@@ -28,9 +28,9 @@ class Condition:
     """Condition and accuracy of one motion.
 
     `number` is the greatest change of any state until the end, relative to the greatest magnitude of that state, per
-    relative change of an input: amplitude, k1, k_C or coefficient of restitution. `error` is the greatest difference
+    relative change of an input: amplitude, k1, k_C or restitution factor. `error` is the greatest difference
     from a run at the tolerance FINE, relative in the same way, and `end_time_error` [s] that of the end time. All are
-    NaN if the two runs end differently, since no digit of such a motion is known.
+    NaN if the two runs end differently, since no digit of such a motion is certain.
     """
 
     number: float
@@ -50,7 +50,7 @@ UNKNOWN = Condition(nan, nan, nan)
 def condition(coupled: Specimen, dwell: Sweep, times: ArrayLike, motion: Motion) -> Condition:
     """Condition of `motion`, which started from rest under the sine `dwell` and is sampled at `times` [s], shape (n,).
 
-    Takes five runs at the tolerance FINE.
+    Performs up to five runs at the tolerance FINE.
     """
 
     def fine(specimen: Specimen, amplitude: float) -> Motion:

@@ -23,7 +23,7 @@ FORMAT, FORMAT_VERSION = "rocking-bench prediction", 1
 
 
 def provenance(request: Parameters, specimen: Specimen, known: SpecimenKnowledge | None = None) -> dict[str, Any]:
-    """Inputs and software versions of a prediction, and the uncertainties of the specimen if they are known."""
+    """Inputs and software versions of a prediction, and the uncertainties of the specimen if `known` is given."""
     found = {"request": request.model_dump(mode="json"), "specimen": specimen.model_dump(mode="json")}
     if known is not None:
         found["known"] = known.model_dump(mode="json")
