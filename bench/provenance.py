@@ -8,7 +8,7 @@ from pathlib import Path
 
 
 def software() -> dict[str, str]:
-    """Versions of this program, Python and the libraries that results depend on."""
+    """Versions of this program, Python and the libraries on which results depend."""
     found = {"rocking-bench": _version("rocking-bench"), "python": platform.python_version()}
     return found | {name: _version(name) for name in ("numpy", "scipy", "numba", "h5py")}
 

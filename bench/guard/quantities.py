@@ -102,7 +102,8 @@ class WatchedQuantities:
 
     def displayed(self, values: Array, magnitudes: Mapping[str, float]) -> dict[str, float]:
         """Magnitudes of a block for display: the current itself instead of its bound, the heating at its last update,
-        about `MOST_SKIPPED` samples ago at most, and the position of each laser within its range instead of the largest one.
+        about `MOST_SKIPPED` samples ago at most, and the position of each laser within its range instead of the largest
+        one.
         """
         found = {key: value for key, value in magnitudes.items() if key != "laser_range"}
         if "current" in found and (current := self._load(values)[1]) is not None:

@@ -91,7 +91,7 @@ class SensorWatch:
             self._driven_samples -= self._drives.popleft().size
 
     def _driven(self) -> bool:
-        """Whether the drive changed by more than `_DRIVEN` times its limit in both halves of the last `_needed` samples.
+        """Whether the drive changed by more than `_DRIVEN` times its limit in each half of the last `_needed` samples.
 
         Near its peaks, a slow drive hardly changes within a single block.
         """

@@ -52,8 +52,8 @@ def bands(
 
     With `members` > 0, the band is from a Monte Carlo simulation with that number of draws. Otherwise it is of first
     order: the gain is computed at one standard uncertainty on both sides along each independent direction (GUM 5.1.4,
-    note 2), and the band is symmetric but not below zero. Where the motion exists on only one side, the result of that side is used for
-    both.
+    note 2), and the band is symmetric but not below zero. Where the motion exists on only one side, the result of that
+    side is used for both.
     """
     best = np.asarray(alpha_2, dtype=np.float64)
     of: dict[Specimen, list[Specimen]] = {}

@@ -28,13 +28,13 @@ TIME = "time_s"
 QUANTITIES: dict[str, tuple[str, str]] = {
     TIME: ("s", "time since the start of the sine, or of one of its periods"),
     "base_acceleration_m_s2": ("m/s2", "acceleration of the base"),
-    "u1_m": ("m", "displacement of the first storey relative to the ground"),
+    "u1_m": ("m", "displacement of the first storey relative to the base"),
     "drift_m": ("m", "drift u2 - u1"),
     "theta_rad": ("rad", "rotation of the block, positive when its top moves towards the frame"),
     "bare_u1_m": ("m", "displacement of the first storey of the bare frame"),
     "bare_drift_m": ("m", "drift of the bare frame"),
 }
-"""Columns of a history: unit and description. The coupled quantities are NaN after the block has overturned."""
+"""Columns of a history: unit and description. The coupled quantities are NaN after an early end of the motion."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +66,8 @@ def histories(specimen: Specimen, request: HistoryRequest, progress: Progress = 
     Raises InvalidInput for steady motions by a solver other than taylor, or a tolerance outside the solver's range.
     """
     if request.steady and request.solver != "taylor":
-        raise InvalidInput("--solver", request.solver, "steady histories are available from taylor only; omit --steady")
+        allowed = "only taylor computes steady histories: choose it, or omit --steady"
+        raise InvalidInput("--solver", request.solver, allowed)
     amplitude = amplitude_of(specimen, request)
     made: list[History] = []
     points, begun = len(request.beta) * len(request.omega), 0
@@ -95,7 +96,7 @@ def history_table(made: Sequence[History]) -> Table:
 def runs_table(made: Sequence[History]) -> Table:
     """Table with one row per history: how it ended, and the largest magnitudes of its samples."""
     columns = _points(made)
-    columns["status"] = Column(np.array([history.status for history in made], np.str_), "", "how the motion ended")
+    columns["status"] = Column(np.array([each.status for each in made], np.str_), "", "final status of the motion")
     columns["end_time_s"] = Column(
         np.array([history.condition.rounded_end(history.end_time) for history in made], np.float64),
         "s",

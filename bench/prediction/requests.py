@@ -54,7 +54,7 @@ class SineRequest(OrbitsRequest):
         None,
         "1",
         "relative tolerance per step of taylor (1e-10 if absent) or dop853; the other solvers use a step of 1 ms; "
-        "steady motions by taylor are periodic to 1e-11 or better, whatever the tolerance",
+        "steady motions by taylor are periodic to about 1e-11, irrespective of the tolerance",
         ge=1e-15,
         le=1e-3,
     )
@@ -91,10 +91,14 @@ class MapRequest(GainRequest):
     omega: tuple[Frequency, ...] = _frequencies(spaced("12", "21", 100), least=2)
     beta: tuple[Stiffness, ...] = _stiffnesses(spaced("0.1", "1.2", 100), least=2)
     outcomes: bool = quantity(
-        False, "", "also simulate the sine switched on at rest at every point, and report its outcome (3 ms per point)"
+        False,
+        "",
+        "also simulate the sine switched on at rest at every point, and report its outcome (about 3 ms per point)",
     )
     band: bool = quantity(
-        False, "", "also compute the band of alpha_2 at every point (half a minute for the default map, to first order)"
+        False,
+        "",
+        "also compute the band of alpha_2 at every point (to first order, about half a minute for the default map)",
     )
 
 
@@ -148,7 +152,7 @@ class HistoryRequest(SineRequest):
     omega: tuple[Frequency, ...] = _frequencies((16.0, 14.0, 17.5))
     beta: tuple[Stiffness, ...] = _stiffnesses((0.40,))
     duration: float = quantity(12.0, "s", "duration of a history that starts from rest", gt=0, le=3600)
-    steady: bool = quantity(False, "", "show the steady motions instead of a start from rest")
+    steady: bool = quantity(False, "", "compute the steady motions instead of a start from rest")
     periods: int = quantity(3, "1", "number of drive periods in a steady history", ge=1, le=1000)
     samples_per_period: int = quantity(200, "1", "number of samples per drive period", ge=8, le=10000)
 
@@ -163,7 +167,7 @@ class RecordsRequest(Parameters):
         None,
         "",
         "frequency band LOW:HIGH [Hz] of the table, to which records are filtered before scaling, or none; if absent, "
-        "that of the configured shaker",
+        "that of the configured bench",
     )
     trim: float = quantity(
         0.0005, "1", "fraction of the Arias intensity removed at each end of a record; 0: none", ge=0, lt=0.5
@@ -218,7 +222,7 @@ class StrokeFitRequest(Parameters):
     method: Literal["both", "least-change", "high-pass"] = quantity(
         "both", "", "fitting method; both: fit by both methods and compare them"
     )
-    share: float = quantity(0.9, "1", "fraction of the bench's stroke and limits that the motion may use", gt=0, le=1)
+    share: float = quantity(0.9, "1", "fraction of half stroke and limits that the motion may use", gt=0, le=1)
     peak_factor: float | None = quantity(
         None,
         "1",

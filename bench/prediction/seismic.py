@@ -98,7 +98,7 @@ def band_study(
     """
     band, betas = band_of(request.table_band, configuration), sorted(request.beta)
     if band is None:
-        raise InvalidInput("--table-band", "none", "the study varies the band's lower end: omit this or give LOW:HIGH")
+        raise InvalidInput("--table-band", "none", "the study varies the band's lower end: omit it or give LOW:HIGH")
     if max(request.corner) >= band[1]:
         raise InvalidInput("--corner", max(request.corner), f"it must be below the band's upper end, {band[1]:g} Hz")
     bands = [(record, (corner, band[1])) for record in records for corner in sorted(request.corner)]
@@ -146,8 +146,8 @@ RECORD: Columns = {
 }
 
 BAND: Columns = {
-    "band_low_hz": (np.float64, "Hz", "lower end of the table's frequency band; absent if no filter is used"),
-    "band_high_hz": (np.float64, "Hz", "upper end of the table's frequency band; absent if no filter is used"),
+    "band_low_hz": (np.float64, "Hz", "lower end of the table's frequency band; absent if no filter was used"),
+    "band_high_hz": (np.float64, "Hz", "upper end of the table's frequency band; absent if no filter was used"),
 }
 
 GAINS: Columns = {
@@ -156,7 +156,7 @@ GAINS: Columns = {
     "beta": (np.float64, "1", "stiffness ratio k_C/k1 of the coupling spring"),
     "alpha_1": (np.float64, "1", "gain of the peak of u1, coupled over bare; absent if the run ended early"),
     "alpha_2": (np.float64, "1", "gain of the peak drift u2 - u1, coupled over bare; absent if the run ended early"),
-    "status": (np.str_, "", "how the run ended"),
+    "status": (np.str_, "", "final status of the run"),
     "toppled": (np.bool_, "1", "whether the block overturned"),
     "toppled_time_s": (
         np.float64,
@@ -184,7 +184,7 @@ GAIN_BANDS: Columns = {
 MOTIONS: Columns = {
     **RECORD,
     "source": (np.str_, "", "file of the record, or method of its synthesis"),
-    "sha256": (np.str_, "", "hash of the file's bytes, or of the samples"),
+    "sha256": (np.str_, "", "SHA-256 of the file's bytes, or of the samples"),
     **BAND,
     "record_peak_m_s2": (np.float64, "m/s2", "greatest acceleration of the record"),
     "factor": (np.float64, "1", "factor by which all accelerations were scaled"),

@@ -235,7 +235,7 @@ def _peaks(omegas: Floats, gains: Mapping[float, Floats]) -> Statement:
         f"at β {SECTIONS[1]:g} and {SECTIONS[2]:g} there is no peak from {LOW:g} to {PAPER_HIGH:g} rad/s",
         "none; the largest gains are at " + _listed(beyond, "{:.2f}") + " rad/s"
         if not any(interior.values())
-        else f"peaks inside: {_listed(interior, '{:.0f}')}",
+        else f"numbers of peaks in this range: {_listed(interior, '{:.0f}')}",
         not any(interior.values()),
         {f"largest at {beta:g}": place for beta, place in beyond.items()},
     )

@@ -60,8 +60,8 @@ def timed_gains(
     scheduler: str | None = None,
     done: Done | None = None,
 ) -> list[Timed | None]:
-    """Run one simulation per prediction by the requested solver, on all processors; None without a rocking orbit.
-
+    """Run one simulation per prediction by the requested solver, on all processors or by the `scheduler`; None where
+    there is no rocking orbit.
     Raises InvalidInput for a tolerance outside the solver's range.
     """
     return sweep(partial(_timed, specimen, request.solver, request.tolerance), predictions, scheduler, done=done)
@@ -195,7 +195,9 @@ def predict_points(specimen: Specimen, request: SineRequest, progress: Progress 
 
 
 def predict_spectra(specimen: Specimen, request: OrbitsRequest, progress: Progress = silent) -> list[GainPrediction]:
-    """Compute the predictions of `predict_points` five times faster, by continuation along ascending frequency."""
+    """Compute the predictions of `predict_points` faster, by continuation, at each stiffness in ascending order of
+    frequency.
+    """
     amplitude, omegas = amplitude_of(specimen, request), sorted(request.omega)
     found: list[GainPrediction] = []
     for i, beta in enumerate(request.beta):

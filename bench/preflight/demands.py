@@ -166,7 +166,9 @@ def _heating(current: Array, held: float, time: float) -> float:
 
 
 PER_CYCLE = 32
-"""Samples per cycle of the highest frequency; a peak between two samples is underestimated by at most 0.5 %."""
+"""Samples per cycle of the highest frequency of the programme; the peak of such a sine is underestimated by at most
+0.5 %.
+"""
 
 TOLERANCE = 1e-7
 """Relative tolerance of the simulations."""
@@ -187,8 +189,8 @@ class Travel:
 def travel_demands(
     travels: Sequence[Travel], halves: tuple[float, float], off_middle: float
 ) -> dict[str, NDArray[np.float64]]:
-    """Laser and drift demands of each specimen, shape (n,), as in `laser_demands`. At rest, the storeys are at a
-    distance of `off_middle` times half the range from mid range.
+    """Laser and drift demands of each specimen, shape (n,), as in `laser_demands`. At rest, the storeys are taken
+    to be at a distance of `off_middle` times half the range from mid range.
     """
     moved = np.array([(each.storey_1, each.storey_2, each.drift) for each in travels]).T
     found = laser_demands(moved[0], moved[1], moved[2], halves)
@@ -232,16 +234,15 @@ LIKELY = 0.95
 """Quantile of the demands of the drawn specimens that is taken as the likely demand."""
 
 UNKNOWN_SHAKER = {
-    "force": "the moving mass or the force constant is unknown: set hardware.moving_mass and hardware.force_constant",
-    "current": "the moving mass or the force constant is unknown: set hardware.moving_mass and hardware.force_constant",
-    "heating": "the moving mass or the force constant is unknown: set hardware.moving_mass and hardware.force_constant",
+    quantity: "moving mass or force constant of the table is unknown: set both moving_mass and force_constant"
+    for quantity in ("force", "current", "heating")
 }
 """Reasons why demands on the shaker are not predicted, by quantity."""
 
 
 UNPROBED = {
-    "drive_voltage": "unknown table: determined by the probes, within limits.drive_voltage",
-    "drive_slew": "unknown table: determined by the probes, within limits.drive_slew",
+    "drive_voltage": "the table is unknown: the probes determine the drive within limits.drive_voltage",
+    "drive_slew": "the table is unknown: the probes determine the drive within limits.drive_slew",
     **UNKNOWN_SHAKER,
 }
 """Reasons why demands are not predicted for a table that the run itself probes, by quantity."""

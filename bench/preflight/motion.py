@@ -51,8 +51,8 @@ def resting_demands(
     Computed from the frequency response: the system is linear while the block rests, because the spring is then
     grounded. The moment about a corner, h_b M a - k_C h1 u1, gives the margin to uplift (Eq. 9 and A.3 of the paper).
 
-    `acceleration` [m/s2] of the table, shape (n,), begins at rest. Force and current are absent for an unknown shaker,
-    `RESTING` is absent without a block.
+    `acceleration` [m/s2] of the table, shape (n,), begins at rest. Force, current and heating are absent for an unknown
+    shaker; `RESTING` is absent without a block.
     """
     from scipy.fft import next_fast_len
 

@@ -30,7 +30,7 @@ from sim.parameters import Parameters
 
 
 class NotComparable(RockbenchError):
-    """Error: the recorded samples are insufficient for the requested analysis."""
+    """Error raised if results of the requested analysis could not be compared with the recorded ones."""
 
     error_code = "not_comparable"
 

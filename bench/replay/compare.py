@@ -40,7 +40,7 @@ DRIVE, JOURNAL, POINTS, ENDING = "drive samples", "journal entries", "points", "
 
 @dataclass(frozen=True)
 class Difference:
-    """Difference from the recording in `part`; `rounding` is True if only the last bits of numbers differ."""
+    """Difference from the recording in `part`; `rounding` is True if numbers differ only to within rounding."""
 
     text: str
     part: str
@@ -179,7 +179,7 @@ class _DriveComparison:
             at = int(np.argmax(distance > DRIVE_ROUNDING))
             where = f"sample {event.block.first + at} of run {event.run}"
             self._first = (
-                f"the drive differs from {where} onward: recorded {stored[at]:.7g} V, replayed {came[at]:.7g} V"
+                f"the drive first differs at {where}: recorded {stored[at]:.7g} V, replayed {came[at]:.7g} V"
             )
 
     def report(self, found: Found) -> None:

@@ -19,7 +19,7 @@ from drivers.rig import Channel, Counts
 from sim.errors import InvalidInput
 
 _AHEAD = 10.0
-"""Duration of the samples read in one access [s]: reading thousands of samples takes no longer than reading one."""
+"""Duration of the samples read in one access [s]: reading thousands of samples takes hardly longer than reading one."""
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,7 @@ class DataFileRecording:
 
     @property
     def description(self) -> dict[str, str]:
-        """Metadata of the recording."""
+        """Title and start time, software, and device of each channel, by name."""
         record = self._record
         devices = {channel.name: channel.device for channel in record.channels}
         return {"recorded": f"{record.title}, {record.start_time}", "software": record.software, **devices}
@@ -151,7 +151,7 @@ def _configuration(record: DataFile) -> BenchConfiguration:
         if first["loc"] == ("backend",):
             allowed = f"{first['msg']}; {record.title} was recorded with this backend"
             raise InvalidInput("backend", first["input"], allowed) from error
-        allowed = "the configuration was written by another version of this software: replay the file with that version"
+        allowed = "this version cannot read the recorded configuration: replay the file with the version that wrote it"
         raise InvalidInput("record", record.title, allowed) from error
     # files of versions without a live model have no table of its estimates
     if record.columns_of(TwinEstimate):

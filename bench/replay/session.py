@@ -125,7 +125,7 @@ class Replayed:
 
     @property
     def identical(self) -> bool:
-        """Whether replay and recording are identical to the last bit."""
+        """Whether all compared values are identical."""
         return not self.found.differences
 
     @property

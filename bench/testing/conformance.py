@@ -11,7 +11,8 @@ behind the rig must be running before the factory is returned, and until the las
 with at most `drive` volts (or 0.1 V, if that is larger) for a fraction of a second and open about twenty rigs in total,
 so that they can run on hardware and in real time. Numbers of samples follow from durations and the rig's sample rate.
 
-`pytest.register_assert_rewrite("bench.testing.conformance")` in a conftest.py shows the values of a failed assertion.
+With `pytest.register_assert_rewrite("bench.testing.conformance")` in a conftest.py, pytest shows the values in a failed
+assertion.
 """
 
 from collections.abc import Callable, Generator

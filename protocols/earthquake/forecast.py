@@ -116,8 +116,8 @@ OFF_MIDDLE = 0.015
 _RAISED = ("acceleration", "force", "current")
 
 _UNKNOWN = {
-    "drive_voltage": "unknown table: identified at the start of the run",
-    "drive_slew": "unknown table: identified at the start of the run",
+    "drive_voltage": "the table is unknown: the run identifies it at its start",
+    "drive_slew": "the table is unknown: the run identifies it at its start",
     **UNKNOWN_SHAKER,
 }
 

@@ -63,8 +63,8 @@ _RAISED = ("acceleration", "force", "current", "drive_slew")
 """Quantities increased by impacts."""
 
 _UNKNOWN = {
-    "drive_voltage": "unknown table: specify table_model",
-    "drive_slew": "unknown table: specify table_model",
+    "drive_voltage": "the table is unknown: specify table_model",
+    "drive_slew": "the table is unknown: specify table_model",
     **UNKNOWN_SHAKER,
 }
 
