@@ -66,7 +66,7 @@ class TwinEstimate(Event):
     Names that end in `_low` and `_high` denote the ends of the model's band, those in `_measured` the values of the
     lasers. `alpha_2` is available once the protocol has published a gain. `residual` is the root mean square (rms) of
     measured minus modelled drift over the last second, `excess` that of the distance of the measured drift from the
-    band, which is 0 within the band. Both are divided by the largest rms of the measured drift over 1 s since arming,
+    band, which is 0 within the band. Both are divided by the largest rms of the measured drift over 1 s since taring,
     or by the uncertainty of the measured drift if that is larger. The band is formed by `members` models together with
     the nominal model. Values that are not available are NaN.
 
@@ -90,10 +90,10 @@ class TwinEstimate(Event):
     drift_low: float = column("m", "drift, lower end of the model's band")
     drift_high: float = column("m", "drift, upper end of the model's band")
     drift_measured: float = column("m", "drift, measured")
-    drift_peak: float = column("m", "peak drift of the model since arming")
-    drift_peak_low: float = column("m", "peak drift since arming, lower end of the model's band")
-    drift_peak_high: float = column("m", "peak drift since arming, upper end of the model's band")
-    drift_peak_measured: float = column("m", "measured peak drift since arming")
+    drift_peak: float = column("m", "peak drift of the model since taring")
+    drift_peak_low: float = column("m", "peak drift since taring, lower end of the model's band")
+    drift_peak_high: float = column("m", "peak drift since taring, upper end of the model's band")
+    drift_peak_measured: float = column("m", "measured peak drift since taring")
     alpha_2: float = column("1", "gain of the model's peak drift, coupled over bare")
     alpha_2_low: float = column("1", "gain of the peak drift, coupled over bare, lower end of the model's band")
     alpha_2_high: float = column("1", "gain of the peak drift, coupled over bare, upper end of the model's band")

@@ -1,6 +1,6 @@
 """Validation of everything that a rig backend returns to the bench.
 
-A backend may belong to another package. An invalid rig, channel or block, or an exception that a rig must not raise,
+A backend may be part of another package. An invalid rig, channel or block, or an exception that a rig must not raise,
 causes a BackendFault, which names the backend. An invalid state of a safety input counts as open.
 """
 
@@ -19,13 +19,13 @@ from sim.errors import RockbenchError
 
 MOST_CHANNELS = 256
 LOWEST_RATE = 1.0
-"""Smallest sample rate [1/s]; at a far lower one, a replay would take forever."""
+"""Smallest accepted sample rate [1/s]."""
 HIGHEST_RATE = 1e6
-"""Largest sample rate [1/s]; above it, this program's buffers would hold less than a second."""
+"""Largest accepted sample rate [1/s]."""
 LONGEST_LEAD = 10.0
-"""Longest lead [s], the delay from writing a drive sample to its output."""
+"""Longest accepted lead [s], the delay from writing a drive sample to its output."""
 HIGHEST_VOLTAGE = 100.0
-"""Largest drive range [V]."""
+"""Largest accepted drive range [V]."""
 
 
 class CheckedClock:

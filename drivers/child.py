@@ -13,7 +13,7 @@ from contextlib import suppress
 from sim import waiting
 
 OWN_CONSOLE = subprocess.CREATE_NO_WINDOW if sys.platform == "win32" else 0
-"""Process creation flag on Windows; a child that does not share the program's console survives its closing."""
+"""Process creation flag on Windows; a child without the program's console survives the closing of that console."""
 
 ENDING = 2.0
 """Longest wait for a child to end [s], after which it is killed."""

@@ -47,8 +47,8 @@ def laser_lag(configuration: BenchConfiguration) -> tuple[float, float]:
 Array = NDArray[np.float64]
 
 _CUTOFF = 0.35
-"""Middle of the transition band, as a fraction of the model's rate. The filter cards limit the signals to frequencies
-far below it.
+"""Middle of the transition band, as a fraction of the model's rate. The signals are assumed to be limited to
+frequencies far below it by the filter cards.
 """
 _HALF_WIDTH = 6
 """Half the length of the filter's impulse response [samples of the model]."""

@@ -1,7 +1,7 @@
 """Live twin: a subscriber to events whose model runs in a separate thread. Acquisition in real time never waits for it.
 
 An estimate is published with the first block read after it is finished. A late model drops half of its members; one
-that is a second behind is switched off until the rig is armed again.
+that is too far behind is switched off until the rig is armed again.
 """
 
 from collections import deque
@@ -92,11 +92,12 @@ class _Run:
 
 
 class Twin:
-    """Computes estimates during every test, from arming to rest, if the model applies to the mounted specimen.
+    """Computes estimates during every test, from taring to rest, if the model applies to the mounted specimen.
 
     `publish` is called in the engine's thread. A `patient` twin waits for its model, so that its estimates are
-    reproducible, as needed in virtual time. The twin warns when the measured drift exceeds the model's band by more
-    than `twin.residual_warn`, and requests a stop when it exceeds the band by more than `twin.residual_stop`.
+    reproducible, as needed in virtual time. If the relative excess of the measured drift over the model's band exceeds
+    `twin.residual_warn`, the twin issues a warning, once per specimen; if it exceeds `twin.residual_stop`, the twin
+    requests a stop.
     """
 
     def __init__(
@@ -137,7 +138,7 @@ class Twin:
                 self._draw()
             case StateChanged():
                 self._about_to_run = event.after is State.RUNNING
-                # the last gain published belongs to the preceding test
+                # the last published gain is that of the preceding test
                 self._measured = None
                 if event.after in (State.IDLE, State.HALTED, State.ARMED):
                     self._end_run()

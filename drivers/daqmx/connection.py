@@ -127,7 +127,7 @@ class Connection:
             raise InvalidInput("hardware.daq.server", server, f"it must be host:port, such as crio.local:{_PORT}")
         if tls is None and not plain:
             require_private(server)
-        # a PC with a local driver does not need gRPC, which takes half a second to import
+        # a PC with a local driver does not need gRPC, which is slow to import
         import grpc
 
         from drivers.daqmx.deadline import Deadline, ReusedCalls

@@ -60,7 +60,7 @@ class Deadline(grpc.UnaryUnaryClientInterceptor):
 
 class ReusedCalls:
     """A channel that creates the call object of each procedure of the server only once; nidaqmx requests the objects of
-    all 450 procedures for every task.
+    all procedures, about 450, for every task.
     """
 
     def __init__(self, channel: Any) -> None:

@@ -52,7 +52,9 @@ class FoundDevice:
         return f"{self.product}, serial number {self.serial}{', simulated' if self.simulated else ''}"
 
     def highest_input_rate(self, channels: int) -> float | None:
-        """Highest sample rate of each channel [1/s] when `channels` of this device are read; None without inputs."""
+        """Highest sample rate of each channel [1/s] if `channels` channels of this device are read; None if it has no
+        inputs.
+        """
         if self.input_rate is None or self.total_input_rate is None or self.simultaneous:
             return self.input_rate
         return min(self.input_rate, self.total_input_rate / channels)
@@ -164,7 +166,7 @@ def checked_devices(
 
 _OUTPUT_LINES = ("enable_line", "heartbeat.line")
 _NIBBLE = 4
-"""Lines of an NI 9401 that share one direction (its operating instructions, p. 7)."""
+"""Number of lines of an NI 9401 that share one direction (its operating instructions, p. 7)."""
 
 
 def _require_one_direction(daq: Daq, used: Mapping[str, FoundDevice]) -> None:

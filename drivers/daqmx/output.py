@@ -84,7 +84,7 @@ class Output:
         put_to_zero(self._connection, self._daq)
 
     def reset_device(self) -> None:
-        """Reset the device: outputs at 0 V, lines low; its tasks are deleted."""
+        """Reset the device, which returns outputs and lines to their default states and deletes the device's tasks."""
         with translated("resetting the device of the output"):
             devices = library.system(self._connection.options()).devices
             name = device_name(self._daq.output).lower()
