@@ -43,10 +43,10 @@ class DaqSession:
 
     `pulses` are output at `daq.laser_marker`, beginning with the start of each run. A run consists of `prepare`,
     `write` with the first samples, `start`, `write` and `read` in turn, and `stop`. On any failure during a run, the
-    relay is opened and the output set to zero before the error is raised.
+    session attempts to open the relay and to set the output to zero before the error is raised.
 
     One thread at a time may use a session; `cut`, `stop` and `close` may be called from any other thread. The
-    constructor brings the bench into a safe state before it checks anything. It raises InvalidInput for unsupported
+    constructor attempts to bring the bench into a safe state before it checks anything. It raises InvalidInput for unsupported
     settings and for a sample rate that the device cannot produce exactly, and DeviceNotFound if the driver, the server
     or a device is missing or held by another program.
     """

@@ -129,8 +129,8 @@ def ask(address: str, command: str, /, *, patience: float = _PATIENCE, **argumen
     """Send a command to the emulated laboratory at `address` (`host:port`), and return the result in its reply; waits
     up to `patience` [s].
 
-    Raises RigError if the command is refused, ConnectionLost without a connection, DeviceTimeout if there is no reply
-    in time, InvalidInput for an invalid address.
+    Raises RigError if the command is refused, ConnectionLost if there is no connection, DeviceTimeout if there is no
+    reply in time, and InvalidInput for an invalid address.
     """
     place = place_of(address)
     deadline = time.monotonic() + patience

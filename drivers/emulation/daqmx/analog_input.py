@@ -211,7 +211,7 @@ class AnalogInput:
         shifts = self.delays * self._plant.tick_rate
         if not shifts.any():
             return self._at(first, (n - 1) * divider + 1)[::divider]
-        # before the plant was switched on, its signals were constant at their first values
+        # before the first tick of the plant, its signals are taken as constant at their first values
         begin = max(first - ceil(float(shifts.max())), 0)
         rows = self._at(begin, first + (n - 1) * divider + self._ahead - begin + 1).astype(np.float64)
         ticks = first + divider * np.arange(n)

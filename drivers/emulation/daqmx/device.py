@@ -60,7 +60,7 @@ class AnalogInputs:
 
 @dataclass(frozen=True)
 class AnalogOutputs:
-    """The outputs of a device: largest magnitudes [V], highest rate [1/s], samples in its onboard memory.
+    """The outputs of a device: largest magnitudes [V], highest rate [1/s], and samples in its onboard memory.
 
     `transfer_condition`: whether the condition of transfers to that memory can be set.
     """

@@ -20,8 +20,8 @@ class Driver:
     """Devices, tasks and reservations, all guarded by `changed`.
 
     The driver outlives every client. `drive` is the output wired to the plant, None if no output is connected. `wires`
-    are connected to the digital lines. `converter` produces the plant's counts. For `output_clock_error` and `packet`
-    see `DaqServer`.
+    are connected to the digital lines. `converter` produces the plant's counts. For `output_clock_error` and
+    `packet`, see `DaqServer`.
     """
 
     def __init__(

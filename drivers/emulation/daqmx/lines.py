@@ -12,8 +12,8 @@ from drivers.emulation.daqmx.errors import DaqmxFailure
 
 @dataclass(frozen=True)
 class Wires:
-    """Wiring by name: receivers of an output line's level (`listeners`) and of a counter's edges (`counters`), sources
-    of an input line's level (`shown`).
+    """Wiring by name: receivers of an output line's level (`listeners`) and of a counter's edges (`counters`), and
+    sources of an input line's level (`shown`).
     """
 
     listeners: Mapping[str, Callable[[bool], None]] = field(default_factory=dict[str, Callable[[bool], None]])
@@ -22,7 +22,7 @@ class Wires:
 
 
 class Lines:
-    """Levels by line name; outputs are low at power-up, unwired inputs are pulled down.
+    """Levels by line name. Outputs are low at power-up, and unwired inputs are pulled down.
 
     The levels have their own lock, because a watchdog may expire at any time.
     """
