@@ -178,9 +178,7 @@ class _DriveComparison:
         if self._first is None and (distance > DRIVE_ROUNDING).any():
             at = int(np.argmax(distance > DRIVE_ROUNDING))
             where = f"sample {event.block.first + at} of run {event.run}"
-            self._first = (
-                f"the drive first differs at {where}: recorded {stored[at]:.7g} V, replayed {came[at]:.7g} V"
-            )
+            self._first = f"the drive first differs at {where}: recorded {stored[at]:.7g} V, replayed {came[at]:.7g} V"
 
     def report(self, found: Found) -> None:
         found.compared[DRIVE] = self.played

@@ -98,7 +98,9 @@ _PER_TIMEOUT = 4
 """Maximum number of resets within one time-out."""
 _REFUSED = {
     int(DAQmxErrors.WATCHDOG_TIMER_NOT_SUPPORTED): "{device} has no watchdog: remove hardware.daq.watchdog",
-    int(DAQmxErrors.WATCHDOG_TIMEOUT_OUT_OF_RANGE_AND_NOT_SPECIAL_VAL): "the watchdog of {device} does not support this time-out",
+    int(
+        DAQmxErrors.WATCHDOG_TIMEOUT_OUT_OF_RANGE_AND_NOT_SPECIAL_VAL
+    ): "the watchdog of {device} does not support this time-out",
 }
 
 

@@ -46,9 +46,9 @@ class DaqSession:
     session attempts to open the relay and to set the output to zero before the error is raised.
 
     One thread at a time may use a session; `cut`, `stop` and `close` may be called from any other thread. The
-    constructor attempts to bring the bench into a safe state before it checks anything. It raises InvalidInput for unsupported
-    settings and for a sample rate that the device cannot produce exactly, and DeviceNotFound if the driver, the server
-    or a device is missing or held by another program.
+    constructor attempts to bring the bench into a safe state before it checks anything. It raises InvalidInput for
+    unsupported settings and for a sample rate that the device cannot produce exactly, and DeviceNotFound if the driver,
+    the server or a device is missing or held by another program.
     """
 
     def __init__(

@@ -12,7 +12,7 @@ from drivers.emulation.daqmx.errors import DaqmxFailure
 from drivers.emulation.daqmx.zoo import build
 
 _CALIBRATED = 2
-"""Index of the input with a non-linear calibration, if any: the input of the analogue output of laser 1."""
+"""Index of the input with a non-linear calibration, if any; the analogue output of laser 1 is wired to it."""
 _BEND = 1.0e-4
 """Contribution of each of the square and cubic terms of the calibration at full scale, relative to the range."""
 

@@ -29,7 +29,7 @@ class Job(Protocol):
 
     @property
     def awaited(self) -> str | None:
-        """The terminal of the awaited start trigger; None without one."""
+        """The terminal of the awaited start trigger; None if there is no trigger."""
         ...
 
     @property
@@ -39,7 +39,7 @@ class Job(Protocol):
 
     @property
     def source(self) -> str | None:
-        """The terminal of the external sample clock; None for a job with its own clock or without one."""
+        """The terminal of the external sample clock; None for a job with its own clock or without a clock."""
         ...
 
     @property

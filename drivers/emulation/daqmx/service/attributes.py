@@ -72,7 +72,7 @@ def _named(channels: Sequence[N], request: _AboutChannel) -> N:
 
 
 class ChannelAttributeService(Service):
-    """Implementation of GetChanAttribute... and SetChanAttribute..."""
+    """Handlers of the calls GetChanAttribute... and SetChanAttribute..."""
 
     def GetChanAttributeDoubleArray(
         self, request: pb.GetChanAttributeDoubleArrayRequest, context: object

@@ -1,4 +1,4 @@
-"""Calls that add channels to tasks."""
+"""Handlers of the calls that add channels to tasks."""
 
 from collections.abc import Callable, Iterator, Sequence
 from typing import TypeVar
@@ -38,7 +38,7 @@ J = TypeVar("J", bound=Job)
 
 
 class ChannelService(Service):
-    """Implementation of Create... for the channels AIVoltage, AOVoltage, DI, DO and COPulseTime."""
+    """Handlers of the calls CreateAIVoltageChan, CreateAOVoltageChan, CreateDIChan, CreateDOChan and CreateCOPulseChanTime."""
 
     def CreateAIVoltageChan(
         self, request: pb.CreateAIVoltageChanRequest, context: object

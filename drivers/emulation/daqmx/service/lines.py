@@ -1,4 +1,4 @@
-"""Calls that manage tasks, read and write digital lines, and control watchdogs."""
+"""Handlers of the calls that manage tasks, read and write digital lines, and control watchdogs."""
 
 # ruff: noqa: ARG002 - gRPC passes a context to every call
 
@@ -22,7 +22,7 @@ from drivers.emulation.daqmx.watchdog import Watchdog
 
 
 class TaskService(Service):
-    """Implementation of CreateTask, ClearTask, StartTask, StopTask, TaskControl, IsTaskDone and GetTaskAttribute..."""
+    """Handlers of the calls CreateTask, ClearTask, StartTask, StopTask, TaskControl, IsTaskDone and GetTaskAttribute..."""
 
     def CreateTask(self, request: pb.CreateTaskRequest, context: object) -> pb.CreateTaskResponse:
         task, new = self.opened(request.session_name, request.initialization_behavior)
@@ -99,7 +99,7 @@ class TaskService(Service):
 
 
 class LineService(Service):
-    """Implementation of WriteDigitalLines and ReadDigitalLines, with one byte per line."""
+    """Handlers of the calls WriteDigitalLines and ReadDigitalLines, with one byte per line."""
 
     def WriteDigitalLines(self, request: pb.WriteDigitalLinesRequest, context: object) -> pb.WriteDigitalLinesResponse:
         task = self._task(request)
@@ -153,9 +153,7 @@ _LEVELS = {Level.HIGH.value: True, Level.LOW.value: False}
 
 
 class WatchdogService(TaskService):
-    """Implementation of CreateWatchdogTimerTaskEx, CfgWatchdog...ExpirStates, ControlWatchdogTask and
-    GetWatchdogAttribute...
-    """
+    """Handlers of the calls CreateWatchdogTimerTaskEx, CfgWatchdog...ExpirStates, ControlWatchdogTask, GetWatchdogAttribute..."""
 
     def CreateWatchdogTimerTaskEx(
         self, request: pb.CreateWatchdogTimerTaskExRequest, context: object

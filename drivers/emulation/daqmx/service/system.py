@@ -1,4 +1,4 @@
-"""Calls about the driver and its devices."""
+"""Handlers of the calls about the driver and its devices."""
 
 # ruff: noqa: ARG002 - gRPC passes a context to every call
 
@@ -26,7 +26,7 @@ _VERSION: Mapping[int, int] = {
     pb.SYSTEM_ATTRIBUTE_NIDAQ_MINOR_VERSION: 8,
     pb.SYSTEM_ATTRIBUTE_NIDAQ_UPDATE_VERSION: 0,
 }
-"""Reported version of the driver: the oldest one in common use, because clients must not require newer functions."""
+"""Reported version of the driver: an older one, because clients must not require newer functions."""
 
 
 def _inputs(device: DeviceModel, attribute: int) -> AnalogInputs:
@@ -88,7 +88,7 @@ _CHASSIS: Mapping[int, ProductCategory] = {
 
 
 class SystemService(Service):
-    """Implementation of GetSystemInfoAttribute..., GetDeviceAttribute..., GetPhysicalChanAttribute..., ResetDevice and
+    """Handlers of the calls GetSystemInfoAttribute..., GetDeviceAttribute..., GetPhysicalChanAttribute..., ResetDevice and
     GetErrorString.
     """
 
