@@ -183,7 +183,8 @@ def software_version() -> str:
 def _check_names(item: str, names: Sequence[str], taken: Sequence[str]) -> None:
     for name in names:
         if not name or "/" in name or "\0" in name or name.strip(".") == "":
-            allowed = "a name in the file must not be empty, consist only of dots, or contain '/' or NUL"
-            raise InvalidInput(item, name, allowed)
+            raise InvalidInput(
+                item, name, "a name in the file must not be empty, consist only of dots, or contain '/' or NUL"
+            )
         if name in taken or names.count(name) > 1:
             raise InvalidInput(item, name, "this name is already used in the file")

@@ -1,4 +1,4 @@
-"""Gain map: the rocking and resting steady motions on a grid of frequencies and stiffnesses, as in Fig. 4 of the paper."""
+"""Gain map: rocking and resting steady motions on a grid of frequencies and stiffnesses, as in Fig. 4 of the paper."""
 
 from collections.abc import Callable, Mapping
 from typing import Any, Literal

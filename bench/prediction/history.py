@@ -66,8 +66,9 @@ def histories(specimen: Specimen, request: HistoryRequest, progress: Progress = 
     Raises InvalidInput for steady motions by a solver other than taylor, or a tolerance outside the solver's range.
     """
     if request.steady and request.solver != "taylor":
-        allowed = "only taylor computes steady histories: choose it, or omit --steady"
-        raise InvalidInput("--solver", request.solver, allowed)
+        raise InvalidInput(
+            "--solver", request.solver, "only taylor computes steady histories: choose it, or omit --steady"
+        )
     amplitude = amplitude_of(specimen, request)
     made: list[History] = []
     points, begun = len(request.beta) * len(request.omega), 0
@@ -96,7 +97,9 @@ def history_table(made: Sequence[History]) -> Table:
 def runs_table(made: Sequence[History]) -> Table:
     """Table with one row per history: how it ended, and the largest magnitudes of its samples."""
     columns = _points(made)
-    columns["status"] = Column(np.array([each.status for each in made], np.str_), "", "final status of the motion")
+    columns["status"] = Column(
+        np.array([history.status for history in made], np.str_), "", "final status of the motion"
+    )
     columns["end_time_s"] = Column(
         np.array([history.condition.rounded_end(history.end_time) for history in made], np.float64),
         "s",

@@ -234,8 +234,9 @@ LIKELY = 0.95
 """Quantile of the demands of the drawn specimens that is taken as the likely demand."""
 
 UNKNOWN_SHAKER = {
-    quantity: "moving mass or force constant of the table is unknown: set both moving_mass and force_constant"
-    for quantity in ("force", "current", "heating")
+    "force": "moving mass or force constant is unknown: set both moving_mass and force_constant",
+    "current": "moving mass or force constant is unknown: set both moving_mass and force_constant",
+    "heating": "moving mass or force constant is unknown: set both moving_mass and force_constant",
 }
 """Reasons why demands on the shaker are not predicted, by quantity."""
 

@@ -135,7 +135,7 @@ class NiDaqmx(
 
 
 class SessionUtilities(SessionUtilitiesServicer):
-    """Handlers of the calls EnumerateDevices and ResetServer."""
+    """Handlers of EnumerateDevices and ResetServer."""
 
     def __init__(self, driver: Driver) -> None:
         self._driver = driver
@@ -169,7 +169,8 @@ class DaqServer:
 
     `drive` is the analogue output that drives the plant and `enable_line` the digital line of its enable relay; the
     defaults are the first of each on the devices. `wires` replaces this wiring of the digital lines if lines other
-    than the relay's are connected. `converter` produces the plant's counts. With `credentials`, connections are encrypted.
+    than the relay's are connected. `converter` produces the plant's counts. With `credentials`, connections are
+    encrypted.
     `output_clock_error` is the relative error (positive: fast) of the rate of an output that does not follow the
     inputs' sample clock. The inputs' sample counter advances in steps of `packet`, as with packet transfer. Raises
     InvalidInput if the address is not available, or if the devices lack `drive` or `enable_line`.

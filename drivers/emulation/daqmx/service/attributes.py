@@ -72,7 +72,7 @@ def _named(channels: Sequence[N], request: _AboutChannel) -> N:
 
 
 class ChannelAttributeService(Service):
-    """Handlers of the calls GetChanAttribute... and SetChanAttribute..."""
+    """Handlers of GetChanAttribute... and SetChanAttribute..."""
 
     def GetChanAttributeDoubleArray(
         self, request: pb.GetChanAttributeDoubleArrayRequest, context: object

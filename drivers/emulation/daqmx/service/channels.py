@@ -1,4 +1,4 @@
-"""Handlers of the calls that add channels to tasks."""
+"""Handlers of calls that add channels to tasks."""
 
 from collections.abc import Callable, Iterator, Sequence
 from typing import TypeVar
@@ -38,7 +38,7 @@ J = TypeVar("J", bound=Job)
 
 
 class ChannelService(Service):
-    """Handlers of the calls CreateAIVoltageChan, CreateAOVoltageChan, CreateDIChan, CreateDOChan and CreateCOPulseChanTime."""
+    """Handlers of CreateAIVoltageChan, CreateAOVoltageChan, CreateDIChan, CreateDOChan and CreateCOPulseChanTime."""
 
     def CreateAIVoltageChan(
         self, request: pb.CreateAIVoltageChanRequest, context: object

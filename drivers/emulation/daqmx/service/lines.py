@@ -1,4 +1,4 @@
-"""Handlers of the calls that manage tasks, read and write digital lines, and control watchdogs."""
+"""Handlers of calls that manage tasks, read and write digital lines, and control watchdogs."""
 
 # ruff: noqa: ARG002 - gRPC passes a context to every call
 
@@ -22,7 +22,7 @@ from drivers.emulation.daqmx.watchdog import Watchdog
 
 
 class TaskService(Service):
-    """Handlers of the calls CreateTask, ClearTask, StartTask, StopTask, TaskControl, IsTaskDone and GetTaskAttribute..."""
+    """Handlers of CreateTask, ClearTask, StartTask, StopTask, TaskControl, IsTaskDone and GetTaskAttribute..."""
 
     def CreateTask(self, request: pb.CreateTaskRequest, context: object) -> pb.CreateTaskResponse:
         task, new = self.opened(request.session_name, request.initialization_behavior)
@@ -99,7 +99,7 @@ class TaskService(Service):
 
 
 class LineService(Service):
-    """Handlers of the calls WriteDigitalLines and ReadDigitalLines, with one byte per line."""
+    """Handlers of WriteDigitalLines and ReadDigitalLines, with one byte per line."""
 
     def WriteDigitalLines(self, request: pb.WriteDigitalLinesRequest, context: object) -> pb.WriteDigitalLinesResponse:
         task = self._task(request)
@@ -153,7 +153,9 @@ _LEVELS = {Level.HIGH.value: True, Level.LOW.value: False}
 
 
 class WatchdogService(TaskService):
-    """Handlers of the calls CreateWatchdogTimerTaskEx, CfgWatchdog...ExpirStates, ControlWatchdogTask, GetWatchdogAttribute..."""
+    """Handlers of CreateWatchdogTimerTaskEx, CfgWatchdog...ExpirStates, ControlWatchdogTask, GetWatchdogAttribute...
+    and SetWatchdogAttribute...
+    """
 
     def CreateWatchdogTimerTaskEx(
         self, request: pb.CreateWatchdogTimerTaskExRequest, context: object

@@ -1,4 +1,4 @@
-"""Handlers of the calls that read and write samples."""
+"""Handlers of calls that read and write samples."""
 
 from typing import Protocol
 
@@ -34,7 +34,7 @@ class _ReadRequest(AboutTask, Protocol):
 
 
 class ReadingService(Service):
-    """Handlers of the calls ReadBinaryI16, ReadBinaryI32, ReadAnalogF64 and GetReadAttribute..."""
+    """Handlers of ReadBinaryI16, ReadBinaryI32, ReadAnalogF64 and GetReadAttribute..."""
 
     def ReadBinaryI16(self, request: pb.ReadBinaryI16Request, context: object) -> pb.ReadBinaryI16Response:
         job, counts, status = self._read(request)
@@ -138,7 +138,7 @@ def _packed(
 
 
 class WritingService(Service):
-    """Handlers of the calls WriteAnalogF64, WriteAnalogScalarF64, GetWriteAttribute... and SetWriteAttribute..."""
+    """Handlers of WriteAnalogF64, WriteAnalogScalarF64, GetWriteAttribute... and SetWriteAttribute..."""
 
     def WriteAnalogF64(self, request: pb.WriteAnalogF64Request, context: object) -> pb.WriteAnalogF64Response:
         task = self._task(request)

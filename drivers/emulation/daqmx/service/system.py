@@ -1,4 +1,4 @@
-"""Handlers of the calls about the driver and its devices."""
+"""Handlers of calls about the driver and its devices."""
 
 # ruff: noqa: ARG002 - gRPC passes a context to every call
 
@@ -88,7 +88,7 @@ _CHASSIS: Mapping[int, ProductCategory] = {
 
 
 class SystemService(Service):
-    """Handlers of the calls GetSystemInfoAttribute..., GetDeviceAttribute..., GetPhysicalChanAttribute..., ResetDevice and
+    """Handlers of GetSystemInfoAttribute..., GetDeviceAttribute..., GetPhysicalChanAttribute..., ResetDevice and
     GetErrorString.
     """
 

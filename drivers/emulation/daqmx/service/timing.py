@@ -1,4 +1,4 @@
-"""Handlers of the calls about sample clocks, start triggers and buffers."""
+"""Handlers of calls about sample clocks, start triggers and buffers."""
 
 # ruff: noqa: ARG002 - gRPC passes a context to every call
 
@@ -33,8 +33,8 @@ def _conversion_rate(job: Sampled, device: str) -> float:
 
 
 class TimingService(Service):
-    """Handlers of the calls CfgSampClkTiming, CfgImplicitTiming, CfgDigEdgeStartTrig and DisableStartTrig, and those for attributes of
-    timing, triggers and buffers.
+    """Handlers of CfgSampClkTiming, CfgImplicitTiming, CfgDigEdgeStartTrig and DisableStartTrig, and of calls about
+    buffers and about attributes of timing and triggers.
     """
 
     def CfgSampClkTiming(self, request: pb.CfgSampClkTimingRequest, context: object) -> pb.CfgSampClkTimingResponse:
