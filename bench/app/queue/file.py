@@ -44,7 +44,7 @@ class QueueFile:
             content: Any = json.loads(text)
             require_shallow(content)
         except (ValueError, RecursionError) as error:
-            raise InvalidInput(ITEM, str(self.path), f"the file is not valid JSON: {error}") from None
+            raise InvalidInput(ITEM, str(self.path), f"the file cannot be read as JSON: {error}") from None
         data = cast(dict[str, Any], content) if isinstance(content, dict) else {}
         if data.get("format") != FORMAT or data.get("format_version") != VERSION:
             raise InvalidInput(ITEM, str(self.path), f'it must have "format": "{FORMAT}", "format_version": {VERSION}')

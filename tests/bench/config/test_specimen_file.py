@@ -55,7 +55,7 @@ def test_a_file_is_never_overwritten(kept: Path) -> None:
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (lambda text: text[:-20], "not valid JSON"),
+        (lambda text: text[:-20], "cannot be read as JSON"),
         (lambda _: "[1, 2]", "it is not a specimen file"),
         (lambda text: text.replace("rocking-bench specimen", "table model"), "it is not a specimen file"),
         (lambda text: text.replace('"format_version": 1', '"format_version": 2'), "the file has 2: update this"),
@@ -67,7 +67,10 @@ def test_a_file_is_never_overwritten(kept: Path) -> None:
         (lambda text: text.replace("210.0", "NaN"), r"findings\[0\].value"),
         (lambda text: text.replace('"k1"', '"k2"', 1), "correlations = 'k1' .* no such finding"),
         (lambda text: text.replace('"date"', '"data"', 1), r"findings\[0\].date = None .* it is required"),
-        (lambda text: text.replace("09:30:00Z", "09:30:00", 1), r"findings\[0\].date .* ISO 8601 with time zone, such"),
+        (
+            lambda text: text.replace("09:30:00Z", "09:30:00", 1),
+            r"findings\[0\].date .* ISO 8601 time with a time zone, such",
+        ),
         (
             lambda text: text.replace('"2026-11-20T09:30:00Z"', '"today"', 1),
             r"findings\[0\].date = 'today' .* ISO 8601",

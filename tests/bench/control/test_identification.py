@@ -189,7 +189,7 @@ def test_a_model_is_written_and_read_back(model: TableModel, tmp_path: Path) -> 
 
 
 @pytest.mark.parametrize(
-    ("text", "says"), [("{", "not valid JSON"), ("{}", "date"), ('{"date": "2026-05-04T12:00:00"}', "date")]
+    ("text", "says"), [("{", "cannot be read as JSON"), ("{}", "date"), ('{"date": "2026-05-04T12:00:00"}', "date")]
 )
 def test_a_file_that_holds_no_model_is_refused(text: str, says: str, tmp_path: Path) -> None:
     path = tmp_path / "table.json"

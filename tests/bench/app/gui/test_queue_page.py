@@ -463,7 +463,7 @@ def test_a_file_that_cannot_be_read_is_left_alone(qtbot: QtBot, tmp_path: Path) 
     path.write_text("{", encoding="utf-8")
     window = _window(qtbot, path)
     assert window.trouble.isVisible()
-    assert "not valid JSON" in window.trouble.answers[0].text()
+    assert "cannot be read as JSON" in window.trouble.answers[0].text()
     window.runner.do(lambda: window.runner.queue.add(Queued(protocol="shaking")))
     assert path.read_text(encoding="utf-8") == "{"
     window.leave()

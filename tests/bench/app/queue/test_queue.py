@@ -113,7 +113,7 @@ def test_a_change_that_cannot_be_kept_is_not_made(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("{", "not valid JSON"),
+        ("{", "cannot be read as JSON"),
         ("[]", '"format"'),
         ('{"format": "rocking-bench queue", "format_version": 9}', '"format_version": 1'),
         ('{"tests": [{"protocol": "harmonic"}]}', '"format"'),
