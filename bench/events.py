@@ -41,7 +41,7 @@ class Event:
     """
 
     table: ClassVar[str] = ""
-    """Path of the table of its columns in the data file, below /entry; empty for an event without such a table."""
+    """Path, below /entry, of the data file's table with the columns of the event; empty for an event without one."""
     journalled: ClassVar[bool] = True
     """Whether the event is written to the journal; frequent events are not."""
     notice: ClassVar[str] = ""

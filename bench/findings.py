@@ -1,4 +1,4 @@
-"""Events that publish the results of identification: the response of the table, fitted models, the specimen."""
+"""Events that publish the results of identification: the response of the table, fitted models and the specimen."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -77,7 +77,7 @@ class TwinEstimate(Event):
     run: int = column("1", "number of the run; each arming of the rig begins one")
     seconds: float = column("s", "time in the run to which the values apply")
     members: int = column("1", "number of models that form the band, excluding the nominal one")
-    standing: float = column("1", "fraction of the models of the band whose block is standing")
+    standing: float = column("1", "fraction of the models, including the nominal one, whose block is standing")
     u1: float = column("m", "u1 of the model")
     u1_low: float = column("m", "u1, lower end of the model's band")
     u1_high: float = column("m", "u1, upper end of the model's band")
@@ -100,9 +100,9 @@ class TwinEstimate(Event):
     alpha_2_measured: float = column("1", "measured gain of the peak drift, coupled over bare")
     theta: float = column("rad", "rocking angle of the model")
     residual: float = column(
-        "1", "rms of measured minus modelled drift over 1 s, relative to the largest rms of the measured drift"
+        "1", "rms of measured minus modelled drift over 1 s, relative to the largest rms of the measured drift so far"
     )
     excess: float = column(
-        "1", "rms distance of the measured drift from the band over 1 s, relative to the largest rms of that drift"
+        "1", "rms distance of the measured drift from the band over 1 s, relative to the largest rms of that drift so far"
     )
     trace: Array

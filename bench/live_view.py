@@ -208,8 +208,8 @@ Live: TypeAlias = Callable[[LiveRun], LiveView]
 
 
 def standard_view(run: LiveRun) -> LiveView:
-    """View of a protocol that declares none: the first available of gains, last fit, response of the table, live
-    values.
+    """View of a protocol that declares none: the first available of gains, last fit, response of the table and
+    live values.
     """
     if "alpha_2" in run.point.model_fields or any("alpha_2" in type(point).model_fields for point in run.points):
         return (GainCurve(),)

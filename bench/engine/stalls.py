@@ -52,7 +52,7 @@ class Stalls:
 
 
 def in_words(seconds: float) -> str:
-    """Message that states a stall of this duration as the cause, with the remedy."""
+    """Message about a stall of this duration, with its possible causes and the remedy."""
     return (
         f"the operating system did not run this program for {seconds:.2f} s (process stopped, computer suspended or"
         " overloaded): close other programs, and disable power saving"

@@ -1,6 +1,7 @@
 """Steps of a plan and their outcomes.
 
-A plan is a generator: it yields steps and receives their outcomes. It can be run, summarised or timed without hardware.
+A plan is a generator: it yields steps and receives their outcomes. The same plan can be run on a rig, or summarised and
+timed without one.
 """
 
 from collections.abc import Callable, Generator
@@ -21,8 +22,8 @@ from sim.specimen import Specimen
 class OperatorAction:
     """Action, described by `request`, that the operator carries out on the bench at rest. Returns `Done`.
 
-    `specimen` is the specimen on the table afterwards. The meaning of `amount` depends on the task, see
-    `drivers.rig.OperatorTask`; the default is the nominal stiffness [N/m] of the specimen's spring, if it has one.
+    `specimen` is the specimen on the table afterwards. The meaning of `amount` depends on the task (see
+    `drivers.rig.OperatorTask`); the default is the nominal stiffness [N/m] of the specimen's spring, if it has one.
     """
 
     work: OperatorTask
@@ -132,7 +133,7 @@ Step = OperatorAction | Arm | AcquireAtRest | Calibrate | Sweep | Dwell | SetHar
 
 @dataclass(frozen=True)
 class Done:
-    """The step was carried out."""
+    """Outcome of a completed step that has no other result."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,5 +1,5 @@
 # pyright: reportUnknownMemberType=false
-"""Uncertainty budgets: one bar per measured value, whose length is the expanded uncertainty."""
+"""Uncertainty budgets: one bar per measured value, with the expanded uncertainty as its length."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING

@@ -29,15 +29,15 @@ width.
 """
 
 HISTORY_WIDTH, HISTORY_ROW, HISTORY_LEGEND = 8.5, 1.55, 0.8
-"""Dimensions of a figure of histories [inch]: width, height of a row, height of legend and axis."""
+"""Dimensions of a figure of histories [inch]: width, height of a row, and height of legend and axis."""
 
 HISTORY_HEADROOM = 1.1
 
 
 @dataclass(frozen=True, eq=False)
 class MotionPicture:
-    """Acceleration of the table [m/s2] under a record, at intervals of `dt` [s]: `asked`, as requested, and `achieved`
-    with the bare frame.
+    """Accelerations of the table [m/s2] for a record, at intervals of `dt` [s]: `asked` is the requested one,
+    `achieved` the measured one with the bare frame.
     """
 
     name: str

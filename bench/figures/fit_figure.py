@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 WIDTH, ROW, LEGEND = 6.8, 1.3, 0.5
-"""Width of the figure, height of a panel, height of legend and axis [inch]."""
+"""Width of the figure, height of a panel, and height of legend and axis [inch]."""
 
 LINES = ((BLUE, "-", 1.4), (VERMILLION, "--", 1.0), (BLACK, ":", 1.0), (GREEN, "-.", 1.0), (PURPLE, "-", 0.8))
 """Colour, dash and width of each curve of a panel, in order."""
@@ -24,8 +24,7 @@ PREFIXED = {"m": ((1e-3, "µm", 1e6), (1.0, "mm", 1e3)), "rad": ((1.0, "mrad", 1
 """For each unit: upper limits of the values, with the prefixed unit and the factor that apply below each."""
 
 APART = 8.0
-"""Maximum ratio of a panel's range of values to that of any of its columns; otherwise the columns are drawn separately.
-"""
+"""Maximum ratio of a panel's range of values to that of any of its columns; beyond it, columns are drawn separately."""
 
 UNCERTAINTY, COVERAGE = "_uncertainty", 2.0
 """Suffix of the columns that are drawn as error bars of other columns, and the coverage factor of the bars."""

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 WIDTH, ROW, MARGIN = 9.0, 2.0, 0.9
-"""Width of the figure, height per motion, height of titles and legend [inch]."""
+"""Width of the figure, height per motion, and height of titles and legend [inch]."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -45,7 +45,7 @@ MARK: Mapping[str, Any] = {
     "markeredgecolor": BLUE,
     "markeredgewidth": 1.6,
 }
-"""Styles of measured points: marker of a point with a gain, marker of a point without a gain, common properties."""
+"""Styles of measured points: markers of a point with a gain and of one without, and common properties."""
 
 SYMBOLS = {"alpha_1": r"$\alpha_1$", "alpha_2": r"$\alpha_2$"}
 

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 WIDTH, ROW = 9.0, 4.2
-"""Width of the figure, height per record [inch]."""
+"""Width of the figure and height per record [inch]."""
 
 LATE = 0.8
 """Position in a history, as a fraction of its length, beyond which the peak value is printed to the left of its

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 DRIFT_WIDTH, DRIFT_ROW, MARGIN = 7.5, 1.25, 0.9
-"""Width of the figure, height per record, height of legend and axis [inch]."""
+"""Width of the figure, height per record, and height of legend and axis [inch]."""
 
 WIDTH, HEIGHT, ROW = 7.5, 6.4, 0.16
 """Width of the figure, its height without the strip of toppled blocks, and height of the strip per record [inch]."""
@@ -39,7 +39,7 @@ DASHES = ("-", "--", "-.", ":")
 BAND_SHADE = 0.15
 
 LETTERS = 100
-"""Length of a legend line [characters]; the drawn sample of the curve counts as eight."""
+"""Maximum length of a legend line [characters]; the drawn sample of the curve counts as eight."""
 
 PANELS, PANELS_WIDTH, PANEL_HEIGHT = 3, 9.5, 2.5
 """Panels per row; width of the figure and height of a row [inch]."""
@@ -92,7 +92,7 @@ class BandCurve:
 
 
 def model_drift_figure(drifts: Sequence[ModelDrift]) -> "Figure":
-    """Predicted drifts, one row per record."""
+    """Predicted drifts of the bare and the coupled frame, one row per record."""
     figure = new_figure(DRIFT_WIDTH, DRIFT_ROW * len(drifts) + MARGIN)
     panels = [figure.add_subplot(len(drifts), 1, k + 1) for k in range(len(drifts))]
     for panel, drift in zip(panels, drifts, strict=True):
@@ -155,7 +155,8 @@ def seismic_figure(curves: Sequence[GainCurve], band: str) -> "Figure":
 def band_figure(curves: Sequence[BandCurve], modes: Sequence[float], upper: float) -> "Figure":
     """alpha_2 against the lower end of the table's band, one panel per record.
 
-    The `upper` end [Hz] of the band is constant. Lines mark the `modes` [Hz] of the bare frame.
+    The `upper` end [Hz] of the band is constant. Lines mark the `modes` [Hz] of the bare frame, crosses
+    the bands in which the block topples.
     """
     names = list(dict.fromkeys(curve.name for curve in curves))
     betas = sorted({curve.beta for curve in curves})

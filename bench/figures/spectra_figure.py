@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 COLUMNS = 3
 PANEL = (3.6, 3.3)
 MARGIN = 1.1
-"""Width and height of a panel, height of title and legend [inch]."""
+"""Width and height of a panel, and height of title and legend [inch]."""
 
 MARKERS = {
     "steady": ("o", VERMILLION),

@@ -1,5 +1,5 @@
 # pyright: reportUnknownMemberType=false
-"""Style of all figures: colours, grid, axes, legend; creation and saving.
+"""Style of all figures: colours, grid, axes and legend; creation and saving of figures.
 
 matplotlib is imported on first use, and never through pyplot, which has global state and opens windows. The keyword
 arguments of matplotlib are untyped, hence the pyright comment in the first line of every figure module.
@@ -64,7 +64,7 @@ def set_grid(panel: "Axes") -> None:
 
 
 def centre(panel: "Axes", *curves: NDArray[np.float64]) -> None:
-    """Centres the vertical axis at zero, with a margin beyond the curves' largest magnitude."""
+    """Centre the vertical axis at zero, with a margin beyond the largest magnitude of the curves."""
     finite = np.concatenate([curve[np.isfinite(curve)] for curve in curves])
     reach = HEADROOM * float(np.abs(finite).max(initial=0.0)) or 1.0
     panel.set_ylim(-reach, reach)

@@ -1,8 +1,8 @@
 """The only path to the shaker.
 
 The guard owns the rig's output. It refuses commands beyond the limits, checks the measured motion within the
-acquisition loop, and ends a run in three ways: *stop* (smooth ramp), *abort* (fast ramp), *halt* (enable line cut
-now). Once a ramp has begun, the factor on the commands can only fall until the guard is armed again.
+acquisition loop, and ends a run in three ways: *stop* (smooth ramp), *abort* (fast ramp) and *halt* (enable line
+cut now). Once a ramp has begun, the factor on the commands can only fall until the guard is armed again.
 """
 
 from collections.abc import Callable, Mapping, Sequence

@@ -27,7 +27,7 @@ WATCHED = {
     "laser_range": ("share of the laser's range", "1"),
     "drift": ("drift", "m"),
 }
-"""Label and unit of every limited quantity of the motion."""
+"""Label and unit of each limited quantity of table, shaker, lasers and specimen."""
 
 
 _MEASURED_BY = {

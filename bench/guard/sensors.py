@@ -45,7 +45,8 @@ class SensorWatch:
         drive: NDArray[np.float64],
         extremes: Extremes | None = None,
     ) -> list[Violation]:
-        """Return sensor violations in counts and values, shape (n, n_channels), for the drive played [V], shape (n,).
+        """Violations by sensors, from their counts and values, shape (n, n_channels), and the drive played [V], shape
+        (n,).
 
         If `extremes` are given and all channels change, a block without missing samples is accepted without examining
         individual samples.
@@ -112,7 +113,7 @@ compared.
 
 
 class TimeWatch:
-    """Compares the arrival of each block with the time of its last sample."""
+    """Check of the delay of each block, and of the difference in rate between sample clock and computer clock."""
 
     def __init__(self, sample_rate: float, limits: Limits) -> None:
         self._rate = sample_rate

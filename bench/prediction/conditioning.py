@@ -20,7 +20,7 @@ CHANGE = 1e-11
 """Relative change of an input. The differences stay linear up to a condition number of about 1e9."""
 
 FINE = 1e-15
-"""Tolerance of the runs that are compared: their errors are 1e-4 of the effect of CHANGE."""
+"""Tolerance of the runs that are compared: 1e-4 of CHANGE."""
 
 
 @dataclass(frozen=True)

@@ -31,7 +31,7 @@ def provenance(request: Parameters, specimen: Specimen, known: SpecimenKnowledge
 
 
 def rows_of(table: Table) -> list[dict[str, Any]]:
-    """One dictionary per row: numbers, Booleans, strings; None where a value is absent (NaN)."""
+    """One dictionary per row: numbers, Booleans and strings, and None where a value is absent (NaN)."""
     columns = [plain(column.values) for column in table.values()]
     return [dict(zip(table, row, strict=True)) for row in zip(*columns, strict=True)]
 
@@ -43,9 +43,9 @@ def plain(values: NDArray[Any]) -> list[Any]:
 
 
 def write_csv(path: Path, table: Table) -> None:
-    """Write a table as CSV: a line of column names, full precision, empty cells for absent values.
+    """Write a table as CSV: a line of column names, numbers in full precision, and empty cells for absent values.
 
-    Raises InvalidInput if `path` exists, RockbenchError when the disk fails.
+    Raises InvalidInput if `path` exists, and RockbenchError if the file cannot be written.
     """
     rows = max((len(column.values) for column in table.values()), default=0)
 
@@ -64,7 +64,7 @@ def write_csv(path: Path, table: Table) -> None:
 def write_hdf5(path: Path, title: str, tables: Mapping[str, Table], metadata: Mapping[str, Any]) -> None:
     """Write tables, with units and descriptions of their columns, and `metadata` to an HDF5 file.
 
-    Raises InvalidInput if `path` exists, RockbenchError when the disk fails.
+    Raises InvalidInput if `path` exists, and RockbenchError if the file cannot be written.
     """
     from bench.datafile import hdf5
     from bench.datafile import tables as stored

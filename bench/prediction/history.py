@@ -55,7 +55,7 @@ class History:
     condition: Condition = UNKNOWN
 
     def peak(self, name: str) -> float:
-        """Largest absolute value of a sampled quantity; NaN without samples."""
+        """Largest absolute value of a sampled quantity; NaN if there are no samples."""
         values = np.abs(self.values[name])
         return float(np.nanmax(values)) if np.isfinite(values).any() else float("nan")
 
@@ -116,7 +116,7 @@ def runs_table(made: Sequence[History]) -> Table:
     columns["condition_number"] = Column(
         np.array([history.condition.number for history in made], np.float64),
         "1",
-        "greatest relative change of the motion per relative change of an input: amplitude, k1, k_C or restitution",
+        "greatest relative change of the motion per relative change of an input: amplitude, k1, k_C or restitution factor",
     )
     columns["relative_error"] = Column(
         np.array([history.condition.error for history in made], np.float64),

@@ -34,7 +34,7 @@ TEXT = "<U16"
 
 
 class MapStore:
-    """Rows of the map defined by `inputs`, JSON content, in `folder`, which this process locks and creates if missing.
+    """Rows of the map defined by `inputs`, JSON content, in `folder`, which this process creates if missing and locks.
 
     Rows of a map with other inputs, or of another version of the program, are discarded with the first block. Raises
     OSError, and InvalidInput if the folder is not one of an unfinished map, or another process writes to it.

@@ -47,7 +47,7 @@ def multipliers_table(
         return Column(np.array(values, dtype=np.float64), unit, description)
 
     moduli = "greatest |Floquet multiplier|: fraction of a disturbance that remains after a period,"
-    angles = "argument of that multiplier: 0 fold, pi flip, between them Neimark-Sacker,"
+    angles = "argument of that multiplier: 0 for a fold, pi for a flip, between them for Neimark-Sacker,"
     return {
         "beta": numbers([beta for beta, _, _ in branches], "1", "stiffness ratio k_C/k1 of the coupling spring"),
         "omega_rad_s": numbers([omega for _, omega, _ in branches], "rad/s", "circular frequency of the base motion"),

@@ -190,7 +190,7 @@ def _points(specimen: Specimen, amplitude: float, points: Mapping[str, Branch]) 
 
 
 def _phases(points: Mapping[str, Branch]) -> Statement:
-    """Check the phase between u1 and theta.
+    """Check the phase between u1 and theta, and the ratio of their peaks.
 
     u1 > 0 is a displacement towards the block, and theta > 0 a rotation of the block towards the frame: equal signs
     mean opposite directions.
@@ -261,7 +261,7 @@ def _listed(values: Mapping[float, float], form: str) -> str:
 
 
 ABOUT = 0.1
-"""Largest difference of the best gain from 0.5 that counts as "around half"."""
+"""Largest difference of the best gain from 0.5 that counts as "about 0.5"."""
 
 
 def seismic_statement(curves: Sequence[SeismicCurve]) -> Statement:

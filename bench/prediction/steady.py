@@ -161,7 +161,7 @@ COLUMNS: dict[str, tuple[str, str, int | None]] = {
         "greatest |Floquet multiplier|: fraction of a disturbance that remains after a period",
         MULTIPLIER_DIGITS,
     ),
-    "floquet_argument_rad": ("rad", "argument of that multiplier: 0 fold, pi flip, between them Neimark-Sacker", 6),
+    "floquet_argument_rad": ("rad", "argument of that multiplier: 0 for a fold, pi for a flip, between them for Neimark-Sacker", 6),
 }
 """Unit, description and significant digits of the results."""
 
@@ -218,7 +218,7 @@ def steady_table(
 
     `timed` has one entry for each prediction: the gains of the rocking branch by another solver, which replace the
     exact ones; an additional column then states how the simulation ended. With `known`, the uncertainties of the
-    specimen, additional columns contain the band of alpha_2, see `bench.prediction.bands.bands`.
+    specimen, additional columns contain the band of alpha_2 (see `bench.prediction.bands.bands`).
     """
     rows: list[Row] = []
     for k, prediction in enumerate(predictions):

@@ -272,7 +272,7 @@ class StageDemands:
 
 
 def demand(quantity: str, asked: Sequence[StageDemands], unknown: Mapping[str, str]) -> Demand:
-    """Largest demand on `quantity` over the parts of a run, or the reason in `unknown` if none is predicted."""
+    """Largest demand on `quantity` among the parts of a run, or the reason in `unknown` if none is predicted."""
     known = [each for each in asked if quantity in each.values]
     if not known:
         return Demand(quantity, None, None, unknown[quantity])
