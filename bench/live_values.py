@@ -103,6 +103,7 @@ class TwinEstimate(Event):
         "1", "rms of measured minus modelled drift over 1 s, relative to the largest rms of the measured drift so far"
     )
     excess: float = column(
-        "1", "rms distance of the measured drift from the band over 1 s, relative to the largest rms of that drift so far"
+        "1",
+        "rms distance of the measured drift from the band over 1 s, relative to the largest rms of that drift so far",
     )
     trace: Array

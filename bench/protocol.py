@@ -39,7 +39,7 @@ Sources: TypeAlias = Mapping[str, Mapping[str, "Column"]]
 class Result:
     """Result of a run, complete or interrupted.
 
-    `text` is printed on the terminal, `findings` (JSON content) are stored in the summary. `figures` and `files` are
+    `text` is printed on the terminal; `findings` (JSON content) are stored in the summary. `figures` and `files` are
     written to the folder of the run, each by a function that is called with the path; the `Protocol` declares their
     names. `passed` is the verdict of a protocol that checks the bench, and None for any other.
     """
@@ -205,7 +205,8 @@ class RunView:
 
 @dataclass(frozen=True)
 class Protocol(Generic[P]):
-    """An experiment. Flags, form, file metadata and documentation are generated from `parameters`, tables from `point`.
+    """An experiment. Flags, form, file metadata and documentation are generated from `parameters`, and tables from
+    `point`.
 
     `prepare` takes the parameters, the bench configuration and, for a replay or re-analysis, the tables of the data
     file, otherwise None. It raises InvalidInput for parameters beyond the capabilities of the bench. Listing the

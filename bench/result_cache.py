@@ -25,7 +25,7 @@ SWITCH = "ROCKBENCH_RESULT_CACHE"
 
 FOLDER = "results"
 MOST = 4000
-"""Maximum number of entries; if it is exceeded, the least recently used ones are removed until half of it remain.
+"""Maximum number of entries; if it is exceeded, the least recently used ones are removed until half that number remain.
 """
 
 PACKAGES = ("bench", "drivers", "protocols", "sim")

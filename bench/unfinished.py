@@ -1,8 +1,8 @@
 """Unfinished results: temporary files and folders that a process must remove, however it ends.
 
 The code that creates such a file or folder removes it, or renames it when it is complete. The list here is needed only
-where no `finally` runs: when an interrupted process ends because its main thread does not respond, see
-`bench.app.cli.interrupt`. A second list contains the complete results, which are listed in the message of a later
+where no `finally` runs: when an interrupted process ends because its main thread does not respond (see
+`bench.app.cli.interrupt`). A second list contains the complete results, which are listed in the message of a later
 interrupt, and a third one the computations that a signal has broken off, whose objects are kept.
 """
 

@@ -106,7 +106,7 @@ class RigState(Enum):
 
 
 class RigBase:
-    """State, drive and clock of a rig: methods of `drivers.rig.Rig` common to all backends.
+    """State, drive and clock of a rig: methods of `drivers.rig.Rig` common to this program's backends.
 
     `lead` is the number of drive samples that must be queued beyond the block being read. As a context manager, it
     closes the rig on exit.

@@ -116,7 +116,7 @@ def runs_table(made: Sequence[History]) -> Table:
     columns["condition_number"] = Column(
         np.array([history.condition.number for history in made], np.float64),
         "1",
-        "greatest relative change of the motion per relative change of an input: amplitude, k1, k_C or restitution factor",
+        "greatest relative change of the motion per relative change of amplitude, k1, k_C or restitution factor",
     )
     columns["relative_error"] = Column(
         np.array([history.condition.error for history in made], np.float64),

@@ -161,7 +161,11 @@ COLUMNS: dict[str, tuple[str, str, int | None]] = {
         "greatest |Floquet multiplier|: fraction of a disturbance that remains after a period",
         MULTIPLIER_DIGITS,
     ),
-    "floquet_argument_rad": ("rad", "argument of that multiplier: 0 for a fold, pi for a flip, between them for Neimark-Sacker", 6),
+    "floquet_argument_rad": (
+        "rad",
+        "argument of that multiplier: 0 for a fold, pi for a flip, between them for Neimark-Sacker",
+        6,
+    ),
 }
 """Unit, description and significant digits of the results."""
 

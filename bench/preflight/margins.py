@@ -190,7 +190,9 @@ def margins_table(margins: Sequence[Margin]) -> Table:
     assumed, likely = "for the nominal specimen", "that 95 % of the specimens stay below, given the uncertainty"
     return {
         "quantity": texts([each.bound.name for each in margins], "limited quantity"),
-        "margin": numbers([each.margin for each in margins], "1", f"1 - demand / limit, {assumed}; NaN if not predicted"),
+        "margin": numbers(
+            [each.margin for each in margins], "1", f"1 - demand / limit, {assumed}; NaN if not predicted"
+        ),
         "margin_95": numbers([each.likely for each in margins], "1", f"1 - demand / limit, for a demand {likely}"),
         "demand": numbers([each.demand.value for each in margins], "SI", f"largest predicted value {assumed}"),
         "demand_95": numbers([each.demand.likely for each in margins], "SI", f"largest predicted value {likely}"),

@@ -49,7 +49,7 @@ def resting_demands(
     """Largest magnitude of each limited quantity, in its unit, and of `RESTING`, while the block rests.
 
     Computed from the frequency response: the system is linear while the block rests, because the spring is then
-    grounded. The moment about a corner, h_b M a - k_C h1 u1, gives the margin to uplift (Eq. 9 and A.3 of the paper).
+    grounded. The moment about a corner, h_b M a - k_C h1 u1, gives the margin to uplift (Eqs. 9 and A.3 of the paper).
 
     `acceleration` [m/s2] of the table, shape (n,), begins at rest. Force, current and heating are absent for an unknown
     shaker; `RESTING` is absent without a block.

@@ -99,7 +99,7 @@ def write_analysis(original: Path, record: DataFile, analysis: Analysis, out: Pa
     """Write the results to a new file and return its path.
 
     Without `out`, the file is `<name>.analysis-<n>.h5` in the original's folder, with the first free n. Raises
-    InvalidInput if `out` exists or cannot be created, DataFileError when the disk fails.
+    InvalidInput if `out` exists or cannot be created, and DataFileError if the disk fails.
     """
     digest = file_hash(original)
     for path in [out] if out is not None else _names(original):

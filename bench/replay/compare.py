@@ -24,7 +24,7 @@ the largest magnitude in the recorded column: a signal that crosses zero has no 
 """
 
 TWIN_ROUNDING = 1e-6
-"""As `ROUNDING`, for the results of the live model, whose impacts amplify differences."""
+"""Like `ROUNDING`, but for the results of the live model, whose impacts amplify differences."""
 
 DRIVE_ROUNDING = 1e-6
 """Largest difference of the drive [V] that is attributed to rounding: far below the step of a 16-bit converter."""

@@ -1,4 +1,4 @@
-"""Recorded course of a run: journal with typed columns, requests to end the run, open safety inputs, alignments."""
+"""Recorded course of a run: journal with typed columns, requests to end the run, open safety inputs and alignments."""
 
 from collections import deque
 from collections.abc import Collection, Iterator, Mapping, Sequence

@@ -1,4 +1,4 @@
-"""Data file as the recording for a replay: samples, times of blocks, safety inputs, requests and answers."""
+"""Data file as the recording for a replay: configuration of the bench, channels, and samples of every run."""
 
 import json
 from collections.abc import Sequence

@@ -103,7 +103,8 @@ class Replayed:
     a killed program, neither of which recorded data can reproduce. `in_place` lists violations that the samples do not
     contain; the replay makes abort requests in their place. `played` of `rows` samples were requested. `same_wording`
     is False for a file with other message texts, and `same_intervals` for one with another evaluation of uncertainties;
-    neither is then compared. `returned` is the result of the plan, or None if the plan did not end by itself.
+    texts or uncertainties are then not compared. `returned` is the result of the plan, or None if the plan did not end
+    by itself.
     """
 
     status: str

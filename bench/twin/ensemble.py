@@ -108,7 +108,7 @@ class Gains:
     def push(self, acceleration: Array, drift: Array, measured: Measured | None) -> Array:
         """Add accelerations [m/s2], shape (n,), and drifts [m], shape (k, n), of the k remaining members.
 
-        Returns alpha_2 of the members, shape (k,). It is NaN for specimens without block, after a member's block has
+        Returns alpha_2 of the members, shape (k,). It is NaN for specimens without a block, after a member's block has
         fallen, while `measured` is None, and during the first cycles of a sine.
         """
         k = len(drift)

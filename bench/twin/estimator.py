@@ -172,7 +172,7 @@ class Setting:
 
 
 class NoEstimate(RockbenchError):
-    """Error: samples of the table's acceleration are missing, so the model cannot continue."""
+    """Error raised if samples of the table's acceleration are missing, so that the model cannot continue."""
 
     error_code = "no_estimate"
 

@@ -31,7 +31,7 @@ Reading = tuple[float, int, float]
 
 
 class ClockWatch:
-    """Child process that reads the sample clock of the task `name` on `daq.server`; `rate` is its rate [1/s]."""
+    """Child process that reads the sample clock, of rate `rate` [1/s], of the task `name` on `daq.server`."""
 
     def __init__(self, daq: Daq, name: str, rate: float) -> None:
         self._child = ChildProcess("drivers.daqmx.clock_watch", name, repr(rate))

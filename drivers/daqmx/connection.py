@@ -82,8 +82,8 @@ class Connection:
 
     `patience` [s] is the time allowed for a call beyond its own time-out. The connection is encrypted if `tls` is
     given. `plain` permits an unencrypted connection to a server outside private networks. Raises DeviceNotFound if no
-    server answers within 2 s, InvalidInput for an address without port, for a plain connection to a public network, and
-    for certificates that cannot be read.
+    server answers within 2 s, and InvalidInput for an address without a port, for a plain connection to a public
+    network, or for certificates that cannot be read.
     """
 
     def __init__(self, server: str | None, patience: float, tls: Tls | None = None, *, plain: bool = False) -> None:

@@ -42,7 +42,7 @@ class Connected:
 
 _SAMPLES = 40.0 + 5.0 / 512.0
 _FIGURE = 1.0e-6
-"""Standard uncertainty of a delay from specifications [s]: rounding to two digits, tolerance of analogue filters."""
+"""Standard uncertainty of a delay from specifications [s]: rounding to two digits and tolerance of analogue filters."""
 _KNOWN = {"9234": (2.6e-6, 5.0e-6), "9237": (4.5e-6, _FIGURE), "9239": (3.3e-6, _FIGURE)}
 """Input delay, by model, of delta-sigma modules that do not report it: time [s] in addition to (40 + 5/512) samples,
 and its standard uncertainty [s], from their specifications and NI's knowledge base, kA00Z0000004A0YSAU. No NI document

@@ -1,7 +1,7 @@
 # pyright: reportUnknownMemberType=false
-"""Typed interface of the part of nidaqmx used here; nidaqmx has no type annotations.
+"""Typed interface to the part of nidaqmx used here; nidaqmx has no type annotations.
 
-`options` select the driver: None for the driver of this PC, otherwise a session of a gRPC device server.
+`options` selects the driver: None for the driver of this PC, otherwise a session of a gRPC device server.
 """
 
 from collections.abc import Sequence
@@ -287,7 +287,7 @@ def system(options: Options) -> System:
 
 
 def task(name: str, options: Options) -> Task:
-    """A new task, or the existing task of this name if `options` request to attach to it."""
+    """A new task, or the existing task of this name if `options` requests attaching to it."""
     return cast(Task, nidaqmx.Task(name, grpc_options=options))
 
 

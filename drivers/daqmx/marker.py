@@ -43,7 +43,7 @@ class Marker:
                 self._task.start()
 
     def clear(self) -> None:
-        """End the pulses; the output is low."""
+        """End the pulses; the output is then low."""
         task, self._task = self._task, None
         if task is not None:
             with translated("clearing the pulse task"):

@@ -1,4 +1,4 @@
-"""Parameters of a DAQ device: wiring, drive output, safety inputs."""
+"""Parameters of a DAQ device: wiring, drive output and safety inputs."""
 
 from typing import Literal
 

@@ -1,4 +1,4 @@
-"""Enable chain: the amplifier's relay, the device's watchdog, the heartbeat of an external relay, the safety inputs.
+"""Enable chain: amplifier relay, watchdog of the device, heartbeat of an external relay, and safety inputs.
 
 The relay is open at low level, and open is safe. X Series devices have a watchdog for their digital lines, cDAQ-9185
 and 9189 have one for all outputs of their modules, and a CompactRIO has none (manuals, "Watchdog Timer"). The heartbeat

@@ -98,7 +98,7 @@ class DaqSession:
 
     @property
     def marker(self) -> str | None:
-        """The counter that outputs the pulses; None without pulses or without a counter."""
+        """The counter that outputs the pulses; None if there are no pulses or no counter."""
         return None if self._tasks.marker is None else self._tasks.marker.counter
 
     @property

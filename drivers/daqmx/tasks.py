@@ -1,4 +1,4 @@
-"""Tasks of one session with a DAQ device: creation, start and stop in order, release."""
+"""Tasks of one session with a DAQ device: creation, ordered start and stop, and release."""
 
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack, suppress
@@ -108,8 +108,8 @@ class Tasks:
             self._await_amplifier(self.safety, self.ready_delay, is_cut)
 
     def rest(self) -> None:
-        """Open the relay, stop the tasks, set the output to 0 V. Attempts every step, even after a failure or an
-        interrupt. Raises an error that is not a RigError, if there was one, otherwise the first failure of relay or
+        """Open the relay, stop the tasks, and set the output to 0 V. Attempts every step, even after a failure or an
+        interrupt. Raises an error that is not a RigError, if there was any; otherwise the first failure of relay or
         output.
         """
         failures: list[BaseException] = []

@@ -85,7 +85,7 @@ class EmulatedBench:
 
     @property
     def rate_true(self) -> float:
-        """Ticks per second of the machine's clock."""
+        """Tick rate by the machine's clock [1/s]."""
         return self._rate
 
     @property

@@ -17,7 +17,7 @@ from sim import waiting
 from sim.errors import InvalidInput, RockbenchError
 
 Handler = Callable[[dict[str, Any]], object]
-"""Handles a command with its arguments; returns data that can be written as JSON."""
+"""Function that carries out a command with its arguments, and returns data that can be written as JSON."""
 
 _LONGEST = 65536
 """Length of the longest request [bytes]."""

@@ -101,7 +101,7 @@ class AnalogInput:
 
     @property
     def converters(self) -> list[DeltaSigma]:
-        """The task's delta-sigma converters, which restrict its sample rates; empty without such converters."""
+        """The task's delta-sigma converters, which restrict its sample rates; empty if it has none."""
         return [one.inputs.delta_sigma for one in self.inputs if one.inputs.delta_sigma is not None]
 
     def conversion(self, device: str) -> float | None:

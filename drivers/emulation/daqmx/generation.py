@@ -81,7 +81,7 @@ class Generation:
 
 
 class Instant:
-    """Provides a common tick for everything that starts or changes simultaneously.
+    """Source of a common tick for everything that starts or changes simultaneously.
 
     `tick` is the plant's clock; it is read under the lock and must not block. The plant takes the same lock when it
     reads past ticks, so that a decision made under the lock precedes every read of the tick that it concerns.

@@ -1,4 +1,4 @@
-"""Two sets of devices, with specifications from the data sheets; lists of names; catalogue of a server's devices."""
+"""Two sets of devices with specifications from the data sheets, lists of names, and catalogue of a server's devices."""
 
 import re
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""Sample clocks: integer fractions of the plant's tick rate."""
+"""Sample clocks, in ticks of the plant, and waiting for their samples."""
 
 import threading
 import time
