@@ -1,4 +1,4 @@
-"""Sections of the configuration: acquisition, simulation, live twin."""
+"""Sections of the configuration: acquisition, simulation and live twin."""
 
 from typing import Literal
 

@@ -78,9 +78,9 @@ class DeviceModel:
 
     `lines` is the number of lines at port 0 that can be outputs, `input_lines` the number that can be inputs; groups of
     `direction_group` consecutive lines share one direction. `watchdog` is the longest time-out [s] of its watchdog,
-    None if it has none; the watchdog of a chassis acts on the outputs of its modules. `input_engines` and `output_engines`
-    are the timing engines of analogue inputs and outputs, in the order of their numbers; a module has the engines of
-    its chassis.
+    None if it has none; the watchdog of a chassis acts on the outputs of its modules. `input_engines` and
+    `output_engines` are the timing engines of analogue inputs and outputs, in the order of their numbers; a module has
+    the engines of its chassis.
     """
 
     name: str
