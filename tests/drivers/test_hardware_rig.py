@@ -6,11 +6,13 @@ import time
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from bench.testing.conformance import RigConformance, RigFactory, play, started
+from bench.testing.resources import held, held_at_last
 from drivers.daqmx.session import DaqSession
 from drivers.emulation.control import ask
 from drivers.emulation.laboratory import Connection, Device, Laboratory
@@ -33,24 +35,25 @@ OUTPUT = "Dev1/ao0"
 SERIAL = pytest.mark.skipif(sys.platform == "win32", reason="emulated serial lasers need pseudo-terminals")
 
 
-def laboratory(connection: Connection, device: Device = "usb", listening: float = 1.0) -> Laboratory:
-    """A laboratory whose clients listen to the lasers for a short time."""
-    emulated = Laboratory(VirtualBenchParameters(), Specimen(), seed=1, connection=connection, device=device)
-    lasers = emulated.hardware.lasers.model_copy(update={"observation_time": listening})
-    emulated.hardware = emulated.hardware.model_copy(update={"lasers": lasers})
-    return emulated
+def laboratory(connection: Connection, device: Device = "usb") -> Laboratory:
+    return Laboratory(VirtualBenchParameters(), Specimen(), seed=1, connection=connection, device=device)
+
+
+def quickly(emulated: Laboratory) -> Hardware:
+    """The configuration of a client that hardly listens to the lasers."""
+    lasers = emulated.hardware.lasers.model_copy(update={"observation_time": HARDLY})
+    return emulated.hardware.model_copy(update={"lasers": lasers})
 
 
 class Wired:
     """One laboratory, a fresh client in each test."""
 
     connection: Connection
-    listening = HARDLY
 
     @pytest.fixture(scope="class")
     @classmethod
     def emulated(cls) -> Iterator[Laboratory]:
-        with laboratory(cls.connection, listening=cls.listening) as emulated:
+        with laboratory(cls.connection) as emulated:
             yield emulated
 
     @pytest.fixture
@@ -58,7 +61,7 @@ class Wired:
         rigs: list[Rig] = []
 
         def make() -> Rig:
-            rigs.append(HardwareRig(emulated.hardware, lead=LEAD))
+            rigs.append(HardwareRig(quickly(emulated), lead=LEAD))
             return rigs[-1]
 
         yield make
@@ -66,60 +69,90 @@ class Wired:
             rig.close()
 
 
+class TestAnalogue(Wired, RigConformance):
+    connection = "analogue"
+
+
 @SERIAL
 @pytest.mark.milliseconds
-class TestSerial(Wired, RigConformance):
+@pytest.mark.soak
+class TestSerialThroughout(Wired, RigConformance):
+    """Also what is the DAQ's alone."""
+
     connection = "serial"
     # it judges clocks, and so listens: see below
     test_blocks_are_contiguous_counted_from_arm_and_wide_enough_for_their_channels = None
 
 
+@pytest.fixture(scope="module")
+def serial() -> Iterator[Laboratory]:
+    with laboratory("serial") as emulated:
+        yield emulated
+
+
 @SERIAL
 @pytest.mark.milliseconds
-class TestSerialClocks(Wired):
-    connection = "serial"
-    listening = 1.0
+class TestSerial:
+    """The part of the suite that the way of reading the lasers makes a difference to, mostly on one rig."""
 
-    def test_blocks_are_contiguous_and_clocks_right(self, make_rig: RigFactory) -> None:
-        RigConformance().test_blocks_are_contiguous_counted_from_arm_and_wide_enough_for_their_channels(make_rig)
-
-    def test_the_sample_clock_is_read_by_a_process_of_its_own_and_not_in_the_loop(
-        self, emulated: Laboratory, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        calls: list[float] = []
-        acquired = DaqSession.acquired
-        monkeypatch.setattr(DaqSession, "acquired", lambda session: calls.append(0.0) or acquired(session))
-        with HardwareRig(emulated.hardware, lead=LONG_LEAD) as rig:
-            watch = rig._watch
-            assert watch is not None
-            rig.arm()
-            rig.write(np.zeros(LONG_LEAD))
-
-            def a_block_without_calls() -> bool:
-                calls.clear()
-                play(rig, np.zeros(200), 200)
-                return not calls and all(np.isfinite(one.offset) for one in rig.alignments)
-
-            # its first readings may come some blocks after the start
-            eventually(a_block_without_calls)
-            assert watch.alive
-        assert not watch.alive
-
-
-class TestAnalogue(Wired):
-    """The part of the suite that the way of reading the lasers makes a difference to."""
-
-    connection = "analogue"
     suite = RigConformance()
+
+    @pytest.fixture(scope="class")
+    @classmethod
+    def rig(cls, serial: Laboratory) -> Iterator[HardwareRig]:
+        with HardwareRig(serial.hardware, lead=LONG_LEAD) as rig:
+            yield rig
+
+    @pytest.fixture
+    def make_rig(self, rig: HardwareRig) -> RigFactory:
+        rig.stop()
+        return lambda: rig
 
     def test_a_rig_describes_itself(self, make_rig: RigFactory) -> None:
         self.suite.test_a_rig_describes_itself(make_rig)
 
-    def test_blocks_are_contiguous(self, make_rig: RigFactory) -> None:
+    def test_blocks_are_contiguous_and_clocks_right(self, make_rig: RigFactory) -> None:
         self.suite.test_blocks_are_contiguous_counted_from_arm_and_wide_enough_for_their_channels(make_rig)
 
-    def test_a_rig_can_be_armed_again(self, make_rig: RigFactory) -> None:
+    def test_a_rig_can_be_armed_again_and_counts_from_zero(self, make_rig: RigFactory) -> None:
         self.suite.test_a_rig_can_be_armed_again_and_counts_from_zero(make_rig)
+
+    def test_the_sample_clock_is_read_by_a_process_of_its_own_and_not_in_the_loop(
+        self, rig: HardwareRig, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        calls: list[float] = []
+        acquired = DaqSession.acquired
+        monkeypatch.setattr(DaqSession, "acquired", lambda session: calls.append(0.0) or acquired(session))
+        watch = rig._watch
+        assert watch is not None
+        rig.stop()
+        rig.arm()
+        rig.write(np.zeros(rig.lead))
+
+        def a_block_without_calls() -> bool:
+            calls.clear()
+            play(rig, np.zeros(200), 200)
+            return not calls and all(np.isfinite(one.offset) for one in rig.alignments)
+
+        # its first readings may come some blocks after the start
+        eventually(a_block_without_calls)
+        assert watch.alive
+
+    def test_closing_ends_the_processes_of_lasers_and_clock(self, serial: Laboratory, rig: HardwareRig) -> None:
+        # the first rig has loaded what stays
+        rig.close()
+        before = held()
+        with HardwareRig(quickly(serial), lead=LONG_LEAD) as another:
+            play(started(another), np.zeros(200), 200)
+            watch = another._watch
+            assert watch is not None
+            assert watch.alive
+            assert held()["processes"] >= before["processes"] + 3
+            for _ in range(3):
+                another.close()
+            assert not watch.alive
+            now = held_at_last(before)
+        assert all(count <= before[kind] for kind, count in now.items()), (before, now)
 
 
 @pytest.fixture(scope="module")
@@ -166,18 +199,25 @@ def test_an_input_whose_calibration_is_not_straight_gives_the_volts_of_the_bench
     assert off.std() < 0.05 * expected.std()
 
 
-@pytest.fixture
-def serial() -> Iterator[Laboratory]:
-    with laboratory("serial", listening=HARDLY) as emulated:
-        yield emulated
-
-
 @SERIAL
 @pytest.mark.milliseconds
 class TestSerialFaults:
-    def test_an_unplugged_laser_ends_the_run_and_the_relay_is_open(self, serial: Laboratory) -> None:
-        with HardwareRig(serial.hardware, lead=LONG_LEAD) as rig:
+    def test_a_laser_without_target_says_why_and_an_unplugged_one_ends_the_run(self) -> None:
+        with laboratory("serial") as serial, HardwareRig(quickly(serial), lead=LONG_LEAD) as rig:
+            names = [channel.name for channel in rig.channels]
+            one, two = names.index("laser_1"), names.index("laser_2")
+            (mark,) = (count for count, why in rig.channels[two].faults.items() if why == "no reflection detected")
             play(started(rig), np.full(400, 0.2), 200)
+            ask(str(serial.hardware.emulator_address), "laser", storey=2, fault="target", arguments=["none"])
+            deadline = time.monotonic() + LONG
+            while True:
+                (block,) = play(rig, np.full(200, 0.2), 200)
+                if (block.counts[:, two] == mark).all():
+                    break
+                assert time.monotonic() < deadline, "waited in vain"
+            assert np.isnan(rig.channels[two].to_unit(block.counts[:, two])).all()
+            assert not np.isnan(rig.channels[one].to_unit(block.counts[:, one])).any()
+            assert serial.bench.enabled
             serial.lasers[0].unplug()
             with pytest.raises(ConnectionLost, match="laser_1"):
                 play(rig, np.full(4000, 0.2), 200)
@@ -185,22 +225,6 @@ class TestSerialFaults:
             assert serial.daq.volts(OUTPUT) == 0.0
             with pytest.raises(RigError):
                 rig.read(1)
-
-    def test_a_laser_without_target_says_why_and_the_run_goes_on(self, serial: Laboratory) -> None:
-        with HardwareRig(serial.hardware, lead=LONG_LEAD) as rig:
-            names = [channel.name for channel in rig.channels]
-            one, two = names.index("laser_1"), names.index("laser_2")
-            (mark,) = (count for count, why in rig.channels[two].faults.items() if why == "no reflection detected")
-            play(started(rig), np.zeros(400), 200)
-            ask(str(serial.hardware.emulator_address), "laser", storey=2, fault="target", arguments=["none"])
-            deadline = time.monotonic() + LONG
-            while True:
-                (block,) = play(rig, np.zeros(200), 200)
-                if (block.counts[:, two] == mark).all():
-                    break
-                assert time.monotonic() < deadline, "waited in vain"
-        assert np.isnan(rig.channels[two].to_unit(block.counts[:, two])).all()
-        assert not np.isnan(rig.channels[one].to_unit(block.counts[:, one])).any()
 
     def test_a_laser_that_is_not_there_is_named(self, serial: Laboratory) -> None:
         wrong = serial.hardware.laser_1.model_copy(update={"port": "/dev/not-there"})
@@ -314,38 +338,32 @@ class TestADeadClient:
         return rig
 
     @pytest.mark.parametrize(
-        ("part", "change"),
+        ("changes", "error"),
         [
-            (None, {"sample_rate": 1999.0}),
-            (None, {"emulator_address": "nowhere"}),
-            ("daq", {"output": "Dev1/ao9"}),
-            ("laser_1", {"range": 5.0}),
+            ({"sample_rate": 1999.0}, InvalidInput),
+            ({"emulator_address": "nowhere"}, InvalidInput),
+            ({"daq": {"output": "Dev1/ao9"}}, InvalidInput),
+            ({"laser_1": {"range": 5.0}}, InvalidInput),
+            ({"lasers": {"connection": "serial"}, "laser_1": {"port": "/dev/not-there"}}, DeviceNotFound),
         ],
     )
-    def test_is_made_safe_by_an_opening_that_is_refused(self, part: str | None, change: dict[str, object]) -> None:
+    def test_is_made_safe_by_an_opening_that_is_refused(
+        self, changes: dict[str, Any], error: type[InvalidInput | RigError]
+    ) -> None:
         with laboratory("analogue") as wire:
             dead = self.dies(wire.hardware)
             assert wire.bench.enabled
             assert wire.daq.volts(OUTPUT) == 2.0
-            update = change if part is None else {part: getattr(wire.hardware, part).model_copy(update=change)}
-            with pytest.raises(InvalidInput):
+            update = {
+                name: getattr(wire.hardware, name).model_copy(update=new) if isinstance(new, dict) else new
+                for name, new in changes.items()
+            }
+            with pytest.raises(error):
                 HardwareRig(wire.hardware.model_copy(update=update), lead=LEAD)
             assert not wire.bench.enabled
             assert wire.daq.volts(OUTPUT) == 0.0
             with suppress(ValueError, RigError):
                 dead.close()
-
-    @SERIAL
-    def test_is_made_safe_though_a_laser_is_not_there(self, serial: Laboratory) -> None:
-        dead = self.dies(serial.hardware)
-        assert serial.bench.enabled
-        wrong = serial.hardware.laser_1.model_copy(update={"port": "/dev/not-there"})
-        with pytest.raises(DeviceNotFound, match="/dev/not-there"):
-            HardwareRig(serial.hardware.model_copy(update={"laser_1": wrong}), lead=LEAD)
-        assert not serial.bench.enabled
-        assert serial.daq.volts(OUTPUT) == 0.0
-        with suppress(ValueError, RigError):
-            dead.close()
 
 
 CLIENT = """
