@@ -1,4 +1,4 @@
-"""Calls to a gRPC device server: their deadlines, and call objects shared by all tasks."""
+"""Calls to a gRPC device server: their deadlines, and call objects and constant answers shared by all tasks."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -58,6 +58,26 @@ class Deadline(grpc.UnaryUnaryClientInterceptor):
         return max(own, 0.0) + _SLOW.get(method, 0.0) + max(patience, _LEAST)
 
 
+_CONSTANT = "GetSystemInfoAttributeUInt32"
+"""Procedure whose answers do not change while a server runs: nidaqmx asks for the three parts of the driver's version
+for every task.
+"""
+
+
+class Remembered:
+    """A procedure of the server whose answer to the same request is obtained only once; a failure is not kept."""
+
+    def __init__(self, call: Any) -> None:
+        self._call = call
+        self._answers: dict[bytes, Any] = {}
+
+    def __call__(self, request: Any, **options: Any) -> Any:
+        key = request.SerializeToString()
+        if key not in self._answers:
+            self._answers[key] = self._call(request, **options)
+        return self._answers[key]
+
+
 class ReusedCalls:
     """A channel that creates the call object of each procedure of the server only once; nidaqmx requests the objects of
     all procedures, about 450, for every task.
@@ -70,7 +90,8 @@ class ReusedCalls:
     def unary_unary(self, method: str, *arguments: Any, **options: Any) -> Any:
         """The object that calls `method`; arguments and options are those of gRPC."""
         if method not in self._calls:
-            self._calls[method] = self._channel.unary_unary(method, *arguments, **options)
+            call = self._channel.unary_unary(method, *arguments, **options)
+            self._calls[method] = Remembered(call) if method.endswith(f"/{_CONSTANT}") else call
         return self._calls[method]
 
     def __getattr__(self, name: str) -> Any:
