@@ -19,8 +19,8 @@ from tests.drivers.lines import complex_amplitudes
 LEAD = 600
 BLOCK = 200
 OMEGA = 2.0 * np.pi * np.array([1.0, 1.5, 2.25, 3.25, 4.5])
-SETTLED, MEASURED = 2000, 6000
-"""Samples: after a second the start is over, three more hold three turns of the slowest sine."""
+SETTLED, MEASURED = 2000, 4000
+"""Samples: after a second the start is over, two more hold two turns of the slowest sine."""
 SERIAL = pytest.mark.skipif(sys.platform == "win32", reason="emulated serial lasers need pseudo-terminals")
 
 
@@ -32,7 +32,7 @@ def compared(connection: Connection, **changes: dict[str, Any]) -> tuple[CommonM
     parameters = VirtualBenchParameters()
     with Laboratory(parameters, Specimen(), seed=1, connection=connection) as laboratory:
         hardware = laboratory.hardware
-        groups = {"lasers": {"observation_time": 2.0, **changes.pop("lasers", {})}, **changes}
+        groups = {"lasers": {"observation_time": 1.0, **changes.pop("lasers", {})}, **changes}
         made = {name: getattr(hardware, name).model_copy(update=new) for name, new in groups.items()}
         with HardwareRig(Hardware.model_validate(dict(hardware) | made), lead=LEAD) as rig:
             rig.perform(OperatorTask.LOCK_FRAME)
@@ -50,7 +50,10 @@ def compared(connection: Connection, **changes: dict[str, Any]) -> tuple[CommonM
 
 @pytest.mark.parametrize("connection", [pytest.param("serial", marks=[SERIAL, pytest.mark.milliseconds]), "analogue"])
 def test_lasers_show_the_tables_motion_at_its_time(connection: Connection) -> None:
-    for found in compared(connection)[:2]:
+    """The table's channel lags by its filter, the laser by its own latency: the difference is what is configured."""
+    *both, configured = compared(connection)
+    assert connection == "analogue" or configured > 2e-3
+    for found in both:
         assert found.polarity == 1
         assert found.scale == pytest.approx(1.0, rel=0.02)
         assert abs(found.delay) < 1e-3
@@ -58,8 +61,8 @@ def test_lasers_show_the_tables_motion_at_its_time(connection: Connection) -> No
 
 @SERIAL
 @pytest.mark.milliseconds
+@pytest.mark.soak
 def test_serial_lasers_without_a_configured_delay_are_early_by_it() -> None:
-    """The table's channel lags by its filter, the laser by its own latency: the difference is what is configured."""
     first, second, configured = compared("serial", lasers={"delay": 0.0})
     assert configured > 2e-3
     assert first.delay == pytest.approx(-configured, abs=1e-3)
