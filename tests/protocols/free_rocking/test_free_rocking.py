@@ -12,7 +12,7 @@ from bench.app.preflight import compile_run
 from bench.app.session import SessionResult, run_session
 from bench.config.model import BenchConfiguration
 from bench.config.result_files import read_specimen
-from bench.config.sections import Simulation
+from bench.config.sections import Acquisition, Simulation
 from bench.datafile.reader import open_datafile
 from bench.document.campaign import Campaign
 from bench.engine.interface import Requests, Unattended
@@ -29,10 +29,11 @@ from sim.free_rocking import critical_angle
 from sim.sensors import Laser
 from sim.specimen import Block, Specimen
 from sim.virtual_bench import VirtualBenchParameters
+from tests.protocols.progress import ends_at_100_percent
 
 FACTOR = 0.985
 PROTOCOL = load_protocol("free-rocking")
-SHORT = FreeRockingParameters(tilts=(0.5,))
+SHORT = FreeRockingParameters(tilts=(0.5,), attempts=2)
 # the rocking block moves by 36 mm: no drift, and not to be taken for one
 LIMITS = Limits(drift=0.02)
 
@@ -40,7 +41,8 @@ LIMITS = Limits(drift=0.02)
 def bench(factor: float = FACTOR, limits: Limits = LIMITS, **changes: object) -> BenchConfiguration:
     simulated = VirtualBenchParameters(laser_2=Laser(scale_error=0.002), **changes)  # type: ignore[arg-type]
     true = Specimen(block=Block(restitution_factor=factor))
-    return BenchConfiguration(simulation=Simulation(bench=simulated, specimen=true), limits=limits)
+    simulation = Simulation(bench=simulated, specimen=true)
+    return BenchConfiguration(acquisition=Acquisition(block_duration=0.2), simulation=simulation, limits=limits)
 
 
 class Declining(Unattended):
@@ -91,6 +93,7 @@ def test_the_restitution_is_found_within_its_uncertainty(session: Session) -> No
     assert combined.impacts == sum(row.impacts for row in tilts) > 40
     assert [np.sign(row.tilt_rad or 0.0) for row in tilts] == [1.0, -1.0]
     assert not any(isinstance(event, Warned) for event in events)
+    ends_at_100_percent(events)
 
 
 def test_nothing_is_driven_and_the_bench_is_left_as_it_was(session: Session) -> None:

@@ -1,6 +1,7 @@
 """Free vibration and springs end to end, on virtual benches that are not as they are assumed to be."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ from bench.app.preflight import compile_run
 from bench.app.session import SessionResult, run_session
 from bench.config.model import BenchConfiguration
 from bench.config.result_files import read_specimen
-from bench.config.sections import Simulation
+from bench.config.sections import Acquisition, Simulation
 from bench.datafile.inspection import verify
 from bench.datafile.reader import open_datafile
 from bench.document.campaign import Campaign
@@ -39,6 +40,7 @@ from sim.parameters import Parameters
 from sim.sensors import Laser
 from sim.specimen import Frame, Specimen
 from sim.virtual_bench import VirtualBenchParameters
+from tests.protocols.progress import ends_at_100_percent
 
 TRUE = Frame(k1=1.04 * 213.44, k2=0.96 * 56.45, xi1=0.013, xi2=0.028)
 SPRING = 1.08
@@ -50,7 +52,7 @@ def bench(**changes: object) -> BenchConfiguration:
     lasers = {"laser_1": Laser(scale_error=0.002), "laser_2": Laser(scale_error=-0.002)}
     simulated = VirtualBenchParameters(sample_rate=1000.0, **lasers)  # type: ignore[arg-type]
     simulation = Simulation(bench=simulated, specimen=Specimen(frame=TRUE), spring_factor=SPRING, seed=3)
-    return BenchConfiguration(simulation=simulation, **changes)  # type: ignore[arg-type]
+    return BenchConfiguration(acquisition=Acquisition(block_duration=0.2), simulation=simulation, **changes)  # type: ignore[arg-type]
 
 
 FRAME, SPRINGS = load_protocol("free-vibration"), load_protocol("coupling-stiffness")
@@ -62,10 +64,13 @@ def prepared(parameters: Parameters, configuration: BenchConfiguration) -> Prepa
     return protocol.prepare(parameters, configuration, None)
 
 
-def run(parameters: Parameters, configuration: BenchConfiguration, out: Path) -> tuple[SessionResult, list[Event]]:
+def run(
+    parameters: Parameters, configuration: BenchConfiguration, out: Path, *, figures: bool = False
+) -> tuple[SessionResult, list[Event]]:
     events: list[Event] = []
+    protocol = FRAME if isinstance(parameters, FreeVibrationParameters) else SPRINGS
     result = run_session(
-        FRAME if isinstance(parameters, FreeVibrationParameters) else SPRINGS,
+        protocol if figures else replace(protocol, figures=()),
         prepared(parameters, configuration),
         out=out,
         operator=Unattended(),
@@ -84,7 +89,7 @@ def close(finding: Finding | None, truth: float) -> bool:
 def test_pulses_tell_the_frame_and_everything_is_kept(tmp_path: Path) -> None:
     out = tmp_path / "run"
     parameters = FreeVibrationParameters(repeats=2, window=10.0)
-    result, events = run(parameters, bench(), out)
+    result, events = run(parameters, bench(), out, figures=True)
     assert (result.status, result.reason) == ("completed", "the plan was carried out")
     found = read_specimen(out / "specimen.json")
     assert found.names == ("k1", "k2", "xi1", "xi2", "m1", "m2")
@@ -118,25 +123,15 @@ def test_pulses_tell_the_frame_and_everything_is_kept(tmp_path: Path) -> None:
     assert verify(out / FILE).problems == ()
     assert (out / "free_vibration.png").stat().st_size > 50_000
     assert "all" in result.table.splitlines()[5]
-
-
-def test_a_frame_let_go_by_hand_says_the_same(tmp_path: Path) -> None:
-    out = tmp_path / "run"
-    parameters = FreeVibrationParameters(excitation="hand", repeats=1, window=20.0, pull=0.025)
-    result, events = run(parameters, bench(), out)
-    assert result.status == "completed"
-    found = read_specimen(out / "specimen.json")
-    assert all(close(found.finding(name), getattr(TRUE, name)) for name in found.names)
-    asked = [event.request.split()[0] for event in events if isinstance(event, OperatorAsked)]
-    assert asked == ["Remove", "Clamp", "Displace", "Remove"]
-    assert not any("probe" in event.text for event in events if isinstance(event, StepStarted))
+    ends_at_100_percent(events)
 
 
 def test_the_spring_is_the_difference_that_it_makes(tmp_path: Path) -> None:
     out = tmp_path / "run"
     parameters = CouplingStiffnessParameters(beta=(0.25, 0.97), repeats=1, window=10.0)
-    result, _ = run(parameters, bench(), out)
+    result, events = run(parameters, bench(), out, figures=True)
     assert result.status == "completed"
+    ends_at_100_percent(events)
     found = read_specimen(out / "specimen.json")
     for label in (0.25, 0.97):
         truth = SPRING * label * 213.44
@@ -233,16 +228,28 @@ def test_what_would_have_no_effect_is_refused(values: dict[str, object], item: s
         FreeVibrationParameters(**values)  # type: ignore[arg-type]
 
 
-def test_a_weighing_that_the_specimen_file_overrules_is_refused_and_other_masses_are_told(tmp_path: Path) -> None:
-    weighed = Identified(findings=(before("m1", 1.0624, 0.0004), before("m2", TRUE.m2, 0.0004)))
+WEIGHED = Identified(findings=(before("m1", 1.0624, 0.0004), before("m2", TRUE.m2, 0.0004)))
+
+
+def test_a_weighing_that_the_specimen_file_overrules_is_refused() -> None:
     with pytest.raises(InvalidInput, match=r"m1 = 1\.0624 kg .*omit this parameter") as refusal:
-        prepared(FreeVibrationParameters(mass_uncertainty=0.05), bench(identified=weighed))
+        prepared(FreeVibrationParameters(mass_uncertainty=0.05), bench(identified=WEIGHED))
     assert refusal.value.item == "mass_uncertainty"
-    parameters = FreeVibrationParameters(excitation="hand", repeats=1, window=5.0)
-    _, events = run(parameters, bench(identified=weighed), tmp_path / "run")
+
+
+def test_a_frame_let_go_by_hand_says_the_same_and_other_masses_are_told(tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    parameters = FreeVibrationParameters(excitation="hand", repeats=1, window=10.0, pull=0.025)
+    result, events = run(parameters, bench(identified=WEIGHED), out)
+    assert result.status == "completed"
+    found = read_specimen(out / "specimen.json")
+    assert all(close(found.finding(name), getattr(TRUE, name)) for name in found.names)
+    assert {"k1", "k2", "xi1", "xi2"} <= set(found.names)
+    asked = [event.request.split()[0] for event in events if isinstance(event, OperatorAsked)]
+    assert asked == ["Remove", "Clamp", "Displace", "Remove"]
+    assert not any("probe" in event.text for event in events if isinstance(event, StepStarted))
     assert any("m1 = 1.0624 kg" in event.text for event in events if isinstance(event, Warned))
-    found = read_specimen(tmp_path / "run" / "specimen.json")
-    assert found.finding("m1") == weighed.finding("m1")
+    assert found.finding("m1") == WEIGHED.finding("m1")
     assert found.correlation(("k1", "m1"))[0, 1] > 0.3
 
 

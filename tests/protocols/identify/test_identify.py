@@ -1,6 +1,7 @@
 """The identification end to end, on virtual benches whose equations are known, and what its files say."""
 
 import json
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from itertools import pairwise
 from pathlib import Path
@@ -15,7 +16,7 @@ from bench.app.preflight import compile_run
 from bench.app.session import SessionResult, run_session
 from bench.config.model import BenchConfiguration
 from bench.config.review import review
-from bench.config.sections import Simulation
+from bench.config.sections import Acquisition, Simulation
 from bench.control.table_model import TableModel
 from bench.datafile.reader import open_datafile
 from bench.engine.interface import Requests, Unattended
@@ -35,6 +36,7 @@ from sim.rocking import simulate
 from sim.shaker import Shaker
 from sim.specimen import Frame, Specimen
 from sim.virtual_bench import VirtualBenchParameters
+from tests.protocols.progress import ends_at_100_percent
 
 Array = NDArray[np.float64]
 
@@ -44,16 +46,17 @@ SHORT = IdentifyParameters(period=2.0, band_low=0.5, band_high=60.0, periods=2)
 
 
 def bench(shaker: Shaker | None = None, specimen: Specimen = DAMPED, **changes: object) -> BenchConfiguration:
-    simulated = VirtualBenchParameters(shaker=shaker or Shaker())
-    return BenchConfiguration(specimen=specimen, simulation=Simulation(bench=simulated), **changes)  # type: ignore[arg-type]
+    simulation = Simulation(bench=VirtualBenchParameters(shaker=shaker or Shaker()))
+    blocks = Acquisition(block_duration=0.2)
+    return BenchConfiguration(specimen=specimen, acquisition=blocks, simulation=simulation, **changes)  # type: ignore[arg-type]
 
 
 def run(
-    parameters: IdentifyParameters, configuration: BenchConfiguration, out: Path
+    parameters: IdentifyParameters, configuration: BenchConfiguration, out: Path, *, figures: bool = False
 ) -> tuple[SessionResult, list[Event]]:
     events: list[Event] = []
     result = run_session(
-        PROTOCOL,
+        PROTOCOL if figures else replace(PROTOCOL, figures=()),
         PROTOCOL.prepare(parameters, configuration, None),
         out=out,
         operator=Unattended(),
@@ -90,7 +93,7 @@ def closed_form(f: Array, shaker: Shaker, specimen: Specimen, rate: float) -> ND
 def identified(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, BenchConfiguration, SessionResult, list[Event]]:
     out = tmp_path_factory.mktemp("identify") / "run"
     configuration = bench(Shaker(friction=0.0))
-    return out, configuration, *run(SHORT, configuration, out)
+    return out, configuration, *run(SHORT, configuration, out, figures=True)
 
 
 Identified = tuple[Path, BenchConfiguration, SessionResult, list[Event]]
@@ -127,6 +130,10 @@ def test_the_level_is_reached_from_below_and_never_passed_by_much(identified: Id
     assert SHORT.level * 0.9 < max(peaks) < SHORT.level * 1.1
 
 
+def test_the_progress_ends_at_100_percent(identified: Identified) -> None:
+    ends_at_100_percent(identified[3])
+
+
 def test_file_model_and_summary_say_the_same(identified: Identified) -> None:
     out, _, result, events = identified
     model = TableModel.read(out / "table_model.json")
@@ -158,7 +165,9 @@ def test_the_identified_table_is_loaded_by_other_runs_at_its_own_rate_only(ident
 
 def test_a_block_rests_while_its_table_is_identified(tmp_path: Path) -> None:
     """The linear moment against the simulation of the whole system: where it rests, and where it lifts."""
-    parameters = IdentifyParameters(beta=0.97, level=3.0, period=2.0, band_low=1.0, band_high=30.0, discarded=2)
+    parameters = IdentifyParameters(
+        beta=0.97, level=3.0, period=2.0, band_low=1.0, band_high=30.0, periods=2, discarded=2
+    )
     configuration, specimen = bench(specimen=Specimen()), Specimen().coupled(0.97)
     found = planned(parameters, configuration)
     assert found.binds == RESTING
