@@ -28,7 +28,10 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> Path:
     model = identify(bench_with(Specimen()), periods=2).model_copy(update={"date": datetime.now(UTC)})
     model.write(folder / "table.json")
     path = folder / "bench.toml"
-    path.write_text(f"table_model = {json.dumps((folder / 'table.json').as_posix())}\n", encoding="utf-8")
+    path.write_text(
+        f"table_model = {json.dumps((folder / 'table.json').as_posix())}\n[acquisition]\nblock_duration = 0.2\n",
+        encoding="utf-8",
+    )
     return path
 
 

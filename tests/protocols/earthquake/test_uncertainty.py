@@ -36,9 +36,16 @@ EXACT = SensorAccuracy(
     table_scale=0.0,
 )
 COUPLED = Specimen(beta=0.4)
-DRAWS = 600
-SCATTER = 0.17
-"""Three standard deviations of a half width from so many draws: an end of 95 % scatters by 0.11 sigma."""
+
+
+@pytest.fixture(params=[250, pytest.param(600, marks=pytest.mark.soak)])
+def draws(request: pytest.FixtureRequest) -> int:
+    return int(request.param)
+
+
+def scatter(draws: int) -> float:
+    """Three standard deviations of a half width: with 600 draws, an end of 95 % scatters by 0.11 sigma."""
+    return 0.17 * (600.0 / draws) ** 0.5
 
 
 def base(peak: float, omega: float = 16.0, noise: float = 0.0) -> BaseMotion:
@@ -62,7 +69,8 @@ def compared(
     coupled: Observed,
     accuracy: SensorAccuracy = EXACT,
     specimen: SpecimenUncertainty = NONE,
-    n: int = DRAWS,
+    *,
+    n: int,
 ) -> Compared:
     return compare(bare, coupled, COUPLED, BenchConfiguration(analysis=accuracy, uncertainty=specimen), n, 1)
 
@@ -93,67 +101,67 @@ def test_each_specimen_is_predicted_under_its_own_motion() -> None:
     assert found.bench == pytest.approx(0.0, abs=1e-9)
 
 
-def test_noise_of_the_peaks_alone_is_in_interval_and_bench_uncertainty() -> None:
-    found = compared(shown(base(0.5), 0.01), shown(base(0.5), 0.02))
+def test_noise_of_the_peaks_alone_is_in_interval_and_bench_uncertainty(draws: int) -> None:
+    found = compared(shown(base(0.5), 0.01), shown(base(0.5), 0.02), n=draws)
     assert found.alpha_2_predicted is not None
     half = 1.96 * np.hypot(0.01, 0.02) * found.alpha_2_predicted
-    assert found.low == pytest.approx(found.alpha_2_predicted - half, abs=SCATTER * half)
-    assert found.high == pytest.approx(found.alpha_2_predicted + half, abs=SCATTER * half)
-    assert found.bench == pytest.approx(half, rel=SCATTER)
+    assert found.low == pytest.approx(found.alpha_2_predicted - half, abs=scatter(draws) * half)
+    assert found.high == pytest.approx(found.alpha_2_predicted + half, abs=scatter(draws) * half)
+    assert found.bench == pytest.approx(half, rel=scatter(draws))
     assert found.budget.dominating == "noise of the peaks"
 
 
-def test_the_specimen_alone_is_in_the_interval_and_not_in_the_bench_uncertainty() -> None:
+def test_the_specimen_alone_is_in_the_interval_and_not_in_the_bench_uncertainty(draws: int) -> None:
     motion = base(1.0)
-    found = compared(shown(motion), shown(motion), specimen=NONE.model_copy(update={"spring": 0.1}))
+    found = compared(shown(motion), shown(motion), specimen=NONE.model_copy(update={"spring": 0.1}), n=draws)
     betas = COUPLED.beta * (1.0 + 0.1 * (2.0 * EVENLY - 1.0))
     low, high = ends([gain(Specimen(beta=beta), motion.record, motion.record) for beta in betas])
     assert high - low > 0.01
-    assert (found.low, found.high) == pytest.approx((low, high), abs=SCATTER * 0.5 * (high - low))
+    assert (found.low, found.high) == pytest.approx((low, high), abs=scatter(draws) * 0.5 * (high - low))
     assert found.bench == pytest.approx(0.0, abs=1e-9)
     assert found.budget.dominating == "stiffness of the spring"
 
 
-def test_both_storeys_stiffness_counts_and_the_spring_keeps_its_own() -> None:
+def test_both_storeys_stiffness_counts_and_the_spring_keeps_its_own(draws: int) -> None:
     motion = base(0.5)
-    found = compared(shown(motion), shown(motion), specimen=NONE.model_copy(update={"stiffness": 0.05}))
+    found = compared(shown(motion), shown(motion), specimen=NONE.model_copy(update={"stiffness": 0.05}), n=draws)
     frame = COUPLED.frame
     random = np.random.default_rng(3)
     gains = []
-    for k1, k2 in 1.0 + 0.05 * random.uniform(-1.0, 1.0, (DRAWS, 2)):
+    for k1, k2 in 1.0 + 0.05 * random.uniform(-1.0, 1.0, (draws, 2)):
         stiff = Frame(**(frame.model_dump() | {"k1": frame.k1 * k1, "k2": frame.k2 * k2}))
         gains.append(gain(Specimen(frame=stiff, beta=COUPLED.beta / k1), motion.record, motion.record))
     low, high = ends(gains)
-    assert (found.low, found.high) == pytest.approx((low, high), abs=2**0.5 * SCATTER * 0.5 * (high - low))
+    assert (found.low, found.high) == pytest.approx((low, high), abs=2**0.5 * scatter(draws) * 0.5 * (high - low))
     assert found.bench == pytest.approx(0.0, abs=1e-9)
 
 
-def test_the_scale_of_the_table_alone_is_in_both() -> None:
+def test_the_scale_of_the_table_alone_is_in_both(draws: int) -> None:
     motion = base(1.3)
-    found = compared(shown(motion), shown(motion), accuracy=EXACT.model_copy(update={"table_scale": 0.005}))
+    found = compared(shown(motion), shown(motion), accuracy=EXACT.model_copy(update={"table_scale": 0.005}), n=draws)
     scales = [1.0 + 0.005 * NormalDist().inv_cdf(p) for p in EVENLY]
     gains = np.array([gain(COUPLED, *[SampledRecord(s * motion.acceleration, motion.dt)] * 2) for s in scales])
     low, high = ends(gains)
     assert high - low > 0.005
-    assert (found.low, found.high) == pytest.approx((low, high), abs=SCATTER * 0.5 * (high - low))
+    assert (found.low, found.high) == pytest.approx((low, high), abs=scatter(draws) * 0.5 * (high - low))
     half = np.quantile(np.abs(gains - gain(COUPLED, motion.record, motion.record)), 0.95)
-    assert found.bench == pytest.approx(half, rel=1.5 * SCATTER)
+    assert found.bench == pytest.approx(half, rel=1.5 * scatter(draws))
 
 
-def test_all_sources_at_once_are_drawn_jointly() -> None:
+def test_all_sources_at_once_are_drawn_jointly(draws: int) -> None:
     """A linear response: sources in squares. The noise of the motion is told from that of the peaks by itself."""
     quiet = base(0.5, noise=1e-5)
-    exact, noisy = (compared(shown(quiet, noise), shown(quiet, noise)) for noise in (0.0, 0.01))
+    exact, noisy = (compared(shown(quiet, noise), shown(quiet, noise), n=draws) for noise in (0.0, 0.01))
     assert exact.bench is not None
     assert noisy.bench is not None
     assert noisy.alpha_2_predicted is not None
     peaks = 1.96 * 0.01 * 2**0.5 * noisy.alpha_2_predicted
     assert exact.bench > 0.2 * peaks
-    assert noisy.bench == pytest.approx(np.hypot(exact.bench, peaks), rel=1.5 * SCATTER)
+    assert noisy.bench == pytest.approx(np.hypot(exact.bench, peaks), rel=1.5 * scatter(draws))
     assert not noisy.chaotic
 
 
-def test_parts_that_saturate_are_told_not_to_add_up(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_parts_that_saturate_are_told_not_to_add_up(draws: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """A chaotic response: whatever is drawn, the gain is anywhere."""
     random = np.random.default_rng(4)
 
@@ -164,10 +172,10 @@ def test_parts_that_saturate_are_told_not_to_add_up(monkeypatch: pytest.MonkeyPa
 
     monkeypatch.setattr(uncertainty, "predict_draws", anywhere)
     observed = shown(base(0.5))
-    found = compared(observed, observed)
+    found = compared(observed, observed, n=draws)
     assert found.chaotic
     # five parts of 0.1 would make 0.45; the gain is within 0.2 of the predicted one
-    assert found.bench == pytest.approx(1.96 * 0.1, rel=1.5 * SCATTER)
+    assert found.bench == pytest.approx(1.96 * 0.1, rel=1.5 * scatter(draws))
     assert any("cannot be separated" in said for said in _remarks(found, observed))
 
 

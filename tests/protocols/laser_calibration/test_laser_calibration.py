@@ -256,8 +256,10 @@ def test_a_calibration_on_the_simulated_bench_agrees_with_its_lasers_and_serves_
     """The waves of the virtual lasers are drawn from the bench's seed; here they are read back from its streams."""
     from numpy.random import SeedSequence
 
-    out = tmp_path / "out"
-    assert main(["run", "laser-calibration", "--seed", "5", "--out", str(out), "--cycles", "4", "--passes", "6"]) == 0
+    out, blocks = tmp_path / "out", tmp_path / "blocks.toml"
+    blocks.write_text("[acquisition]\nblock_duration = 0.2\n", encoding="utf-8")
+    command = ["run", "laser-calibration", "--seed", "5", "--cycles", "4", "--passes", "6", "--config", str(blocks)]
+    assert main([*command, "--out", str(out)]) == 0
     one = read_calibration(out / "laser_calibration.json")
     spans = []
     x = np.array([-0.045, 0.045])
