@@ -1,6 +1,7 @@
 """A scripted bench for the harmonic plan: answers its steps and keeps them."""
 
 from collections.abc import Callable
+from functools import cache
 
 import numpy as np
 
@@ -40,6 +41,12 @@ def cycle(index: int, drift: float, u1: float = 0.001, turn: float = 0.0) -> Cyc
     return pure_cycle(index, fundamental, samples=700)
 
 
+@cache
+def usual() -> HarmonicCampaign:
+    """The campaign of `PARAMETERS`, whose starts are planned once; each of its plans begins anew."""
+    return HarmonicCampaign(PARAMETERS, BenchConfiguration())
+
+
 class Script:
     """Answers the steps of a plan and keeps them."""
 
@@ -49,7 +56,7 @@ class Script:
         bare: float,
         prepared: HarmonicCampaign | None = None,
     ) -> None:
-        self._prepared = prepared or HarmonicCampaign(PARAMETERS, BenchConfiguration())
+        self._prepared = prepared or usual()
         self._coupled, self._bare = coupled, bare
         self.steps: list[Step] = []
         self.start = 0

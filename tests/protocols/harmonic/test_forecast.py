@@ -1,25 +1,17 @@
-"""The forecast of a harmonic campaign: against closed forms, against the lab sheet, and against a run."""
+"""The forecast of a harmonic campaign: against closed forms and against the lab sheet; `test_point` has a run."""
 
 import json
-from collections import defaultdict
 from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
-import h5py
-import numpy as np
 import pytest
 
-from bench.analysis.signals import DRIFT, SignalMap
 from bench.app.cli.main import main
 from bench.app.preflight import Preflight, compile_run
 from bench.config.model import BenchConfiguration
 from bench.control.oscillator import Segment, program
 from bench.engine.steps import Dwell, Sweep
-from bench.guard.conversion import Extremes
-from bench.guard.limits import Violation
-from bench.guard.motion import MotionWatch
-from bench.guard.quantities import WatchedQuantities
 from bench.preflight.demands import response_of, stage_travels
 from bench.preflight.margins import Demand
 from protocols.common.sine.demands import Trial
@@ -144,68 +136,6 @@ def test_on_an_unknown_table_the_drive_is_not_predicted_and_says_why() -> None:
         assert found[quantity].value is None
         assert "unknown" in found[quantity].where
     assert found["drift"].value is not None
-
-
-def _largest_seen(monkeypatch: pytest.MonkeyPatch) -> dict[str, float]:
-    """Fills with the largest value of each quantity that the guard watches."""
-    seen: dict[str, float] = defaultdict(float)
-    watch = WatchedQuantities.of
-
-    def of(self: WatchedQuantities, values: np.ndarray) -> dict[str, np.ndarray]:
-        found = watch(self, values)
-        for key, size in found.items():
-            seen[key] = max(seen[key], float(size.max()))
-        return found
-
-    check = MotionWatch.check
-
-    def every_sample(
-        self: MotionWatch, first: int, values: np.ndarray, signals: np.ndarray, _extremes: Extremes | None
-    ) -> tuple[list[Violation], list[Violation]]:
-        return check(self, first, values, signals)
-
-    signals = SignalMap.of
-
-    def signals_of(self: SignalMap, values: np.ndarray) -> np.ndarray:
-        found = signals(self, values)
-        seen["drift"] = max(seen["drift"], float(np.nanmax(np.abs(found[:, DRIFT]))))
-        return found
-
-    monkeypatch.setattr(WatchedQuantities, "of", of)
-    monkeypatch.setattr(MotionWatch, "check", every_sample)
-    monkeypatch.setattr(SignalMap, "of", signals_of)
-    return seen
-
-
-def test_a_run_shows_what_was_predicted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Every maximum lies below its prediction for 95 % of the specimens, and not below 75 % of the assumed one's."""
-    seen = _largest_seen(monkeypatch)
-    folder = tmp_path / "run"
-    assert main(["run", "harmonic", "--omega", "16", "--beta", "0.4", "--yes", "--out", str(folder)]) == 0
-    with h5py.File(folder / "campaign.h5", "r") as file:
-        entry = file["entry"]
-        volts = entry["instrument/drive/voltage"][:]
-        seen["drive_voltage"] = float(np.abs(volts).max())
-        blocks = entry["instrument/blocks"]
-        armed = blocks["row"][:][np.flatnonzero(np.diff(blocks["run"][:])) + 1]
-        runs = np.split(volts, armed)
-        seen["drive_slew"] = max(float(np.abs(np.diff(run)).max()) for run in runs) * 2000.0
-        names = [name.decode() for name in entry["preflight/quantity"][:]]
-        assert len(names) == 11
-        assert list(entry["preflight/margin"][:]) == sorted(entry["preflight/margin"][:])
-        assert entry["planned_drive/omega"].shape[0] > 20
-        stored = entry["metadata/plan_hash"][()].decode()
-    assert json.loads((folder / "summary.json").read_text(encoding="utf-8"))["plan_hash"] == stored
-    found = _compiled()
-    assert found.plan_hash == stored
-    demands = _by_quantity(found)
-    lasers = [demands.pop("laser_1"), demands.pop("laser_2")]
-    demands["laser_range"] = max(lasers, key=lambda demand: demand.value or 0.0)
-    assert demands.keys() == seen.keys()
-    for quantity, demand in demands.items():
-        assert demand.value is not None
-        assert demand.likely is not None
-        assert 0.75 * demand.value <= seen[quantity] <= demand.likely, quantity
 
 
 def test_a_campaign_beyond_a_limit_is_refused_before_anything_is_opened(

@@ -92,7 +92,10 @@ def faulty(campaign: HarmonicCampaign, tmp_path: Path) -> Faulty:
     return run
 
 
-@pytest.mark.parametrize(("gain", "late"), [(0.7, 0.0), (1.3, 0.0), (1.0, np.radians(40.0) / 15.0)])
+@pytest.mark.parametrize(
+    ("gain", "late"),
+    [(0.7, 0.0), pytest.param(1.3, 0.0, marks=pytest.mark.soak), (1.0, np.radians(40.0) / 15.0)],
+)
 def test_a_table_that_changes_its_gain_or_phase_releases_the_hold(faulty: Faulty, gain: float, late: float) -> None:
     run = faulty(gain, late, False)
     assert run.ending.status == "completed"

@@ -21,12 +21,14 @@ from protocols.common.sine.holding import HoldCycle, hold, prepared, too_late
 from protocols.common.sine.settling import Held, TableState
 from protocols.harmonic.campaign import HarmonicCampaign
 from protocols.harmonic.forecast import trials
-from protocols.harmonic.protocol import HarmonicParameters
+from protocols.harmonic.protocol import HarmonicParameters, PointStatus
 from sim.cycle_map import CycleMap
 from sim.gain import predict_gain
 from sim.specimen import Specimen
 from sim.steady import Orbit
 from tests.protocols.harmonic.scripted import AMPLITUDE, Script, cycle
+
+pytestmark = pytest.mark.usefixtures("shared_results")
 
 OMEGA, BETA = 15.0, 0.97
 PARAMETERS = HarmonicParameters(omega=(OMEGA,), beta=(BETA,), starts=1, settle_limit=30.0, measured_cycles=12)
@@ -85,6 +87,18 @@ def test_a_point_that_cannot_be_held_states_latency_cycle_and_remedy(omega: floa
     assert f"0.5 s, are longer than a cycle of {tau / omega:.3f} s" in point.reason
     assert "reduce them" in point.reason
     assert not [step for step in script.steps if isinstance(step, SetHarmonics) and step.cycle is not None]
+
+
+@pytest.mark.parametrize("held", [False, True])
+def test_without_a_hold_only_the_free_motion_is_measured(held: bool) -> None:
+    parameters = PARAMETERS.model_copy(update={"hold": held})
+    campaign = HarmonicCampaign(parameters, BenchConfiguration())
+    script = Script(lambda _, k: cycle(k, DRIFT * (1.0 + 0.3 * np.sin(2.4 * k))), 0.05, campaign)
+    (point,) = script.run()
+    assert any(isinstance(step, SetHarmonics) and step.cycle is not None for step in script.steps) is held
+    assert point.status is PointStatus.MODULATED
+    assert point.control_share is None
+    assert point.alpha_2 == point.alpha_2_greatest
 
 
 @pytest.mark.parametrize(("lead", "authority"), [(0.1, PARAMETERS.hold_authority), (0.4, 0.0)])

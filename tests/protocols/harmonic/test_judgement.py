@@ -61,9 +61,22 @@ def test_each_branch_is_recognised(branch: str, status: PointStatus, error: floa
 EXACT = SensorAccuracy(laser_linearity=0.0, laser_mismatch=0.0, laser_resolution=0.0, table_scale=0.0)
 
 
-@pytest.mark.parametrize("accuracy", [EXACT, EXACT.model_copy(update={"table_scale": 0.005})])
-@pytest.mark.parametrize("known", [KNOWN, SpecimenKnowledge(stiffness=0.01)])
-@pytest.mark.parametrize("side", [-1.0, 1.0])
+INEXACT, DOUBTFUL = EXACT.model_copy(update={"table_scale": 0.005}), SpecimenKnowledge(stiffness=0.01)
+
+
+@pytest.mark.parametrize(
+    ("accuracy", "known", "side"),
+    [
+        (EXACT, KNOWN, 1.0),
+        (EXACT, DOUBTFUL, -1.0),
+        (INEXACT, KNOWN, -1.0),
+        (INEXACT, DOUBTFUL, 1.0),
+        pytest.param(EXACT, KNOWN, -1.0, marks=pytest.mark.soak),
+        pytest.param(EXACT, DOUBTFUL, 1.0, marks=pytest.mark.soak),
+        pytest.param(INEXACT, KNOWN, 1.0, marks=pytest.mark.soak),
+        pytest.param(INEXACT, DOUBTFUL, -1.0, marks=pytest.mark.soak),
+    ],
+)
 def test_a_difference_beyond_the_uncertainties_of_both_is_flagged(
     accuracy: SensorAccuracy, known: SpecimenKnowledge, side: float
 ) -> None:

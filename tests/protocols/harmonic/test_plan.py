@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from bench.config.model import BenchConfiguration
 from bench.engine.steps import (
     Arm,
     Calibrate,
@@ -20,10 +21,13 @@ from bench.events import Progress
 from bench.live_values import Estimate
 from drivers.rig import OperatorTask
 from protocols.common.calibrate import PROBE, Unmeasurable
+from protocols.harmonic.campaign import HarmonicCampaign
 from protocols.harmonic.protocol import PointStatus
 from sim.gain import predict_gain
 from sim.specimen import Specimen
-from tests.protocols.harmonic.scripted import AMPLITUDE, BETA, OMEGA, Script, cycle
+from tests.protocols.harmonic.scripted import AMPLITUDE, BETA, OMEGA, PARAMETERS, Script, cycle
+
+pytestmark = pytest.mark.usefixtures("shared_results")
 
 
 @pytest.fixture(scope="module")
@@ -43,6 +47,14 @@ def test_a_steady_rocking_motion_is_the_point_at_the_first_start(peaks: tuple[fl
     assert point.agrees is True
     assert point.starts_tried == 1
     assert script.works() == [OperatorTask.REMOVE_BLOCK, OperatorTask.MOUNT_SPRING]
+
+
+def test_points_are_reported_in_the_order_in_which_they_were_asked_for(peaks: tuple[float, float, float]) -> None:
+    bare, drift, u1 = peaks
+    parameters = PARAMETERS.model_copy(update={"omega": (17.0, OMEGA), "starts": 1})
+    campaign = HarmonicCampaign(parameters, BenchConfiguration())
+    points = Script(lambda _, k: cycle(k, drift, u1), bare, campaign).run()
+    assert [(point.omega_rad_s, point.beta) for point in points] == [(17.0, BETA), (OMEGA, BETA)]
 
 
 def test_a_fall_is_ended_fast_the_block_stood_up_and_the_next_start_tried(peaks: tuple[float, float, float]) -> None:

@@ -1,6 +1,7 @@
 """One point of the campaign from the command line to the files, on the virtual bench."""
 
 import json
+from collections import defaultdict
 from pathlib import Path
 from typing import Any
 
@@ -8,7 +9,17 @@ import h5py
 import numpy as np
 import pytest
 
+from bench.analysis.signals import DRIFT, SignalMap
 from bench.app.cli.main import main
+from bench.app.preflight import compile_run
+from bench.config.model import BenchConfiguration
+from bench.config.sections import Simulation
+from bench.guard.conversion import Extremes
+from bench.guard.limits import Violation
+from bench.guard.motion import MotionWatch
+from bench.guard.quantities import WatchedQuantities
+from protocols.harmonic.campaign import HarmonicCampaign
+from protocols.harmonic.protocol import HarmonicParameters
 from sim.gain import predict_gain
 from sim.specimen import Specimen
 
@@ -26,10 +37,50 @@ def _summary(folder: Path) -> dict[str, Any]:
     return json.loads((folder / "summary.json").read_text(encoding="utf-8"))
 
 
+def _largest_seen(monkeypatch: pytest.MonkeyPatch) -> dict[str, float]:
+    """Fills with the largest value of each quantity that the guard watches."""
+    seen: dict[str, float] = defaultdict(float)
+    watch = WatchedQuantities.of
+
+    def of(self: WatchedQuantities, values: np.ndarray) -> dict[str, np.ndarray]:
+        found = watch(self, values)
+        for key, size in found.items():
+            seen[key] = max(seen[key], float(size.max()))
+        return found
+
+    check = MotionWatch.check
+
+    def every_sample(
+        self: MotionWatch, first: int, values: np.ndarray, signals: np.ndarray, _extremes: Extremes | None
+    ) -> tuple[list[Violation], list[Violation]]:
+        return check(self, first, values, signals)
+
+    signals = SignalMap.of
+
+    def signals_of(self: SignalMap, values: np.ndarray) -> np.ndarray:
+        found = signals(self, values)
+        seen["drift"] = max(seen["drift"], float(np.nanmax(np.abs(found[:, DRIFT]))))
+        return found
+
+    monkeypatch.setattr(WatchedQuantities, "of", of)
+    monkeypatch.setattr(MotionWatch, "check", every_sample)
+    monkeypatch.setattr(SignalMap, "of", signals_of)
+    return seen
+
+
 @pytest.fixture(scope="module")
-def done(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    code, folder = _run(tmp_path_factory.mktemp("seed3") / "run", "--seed", "3")
+def seen() -> dict[str, float]:
+    """The largest value of each watched quantity in the run."""
+    return {}
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory: pytest.TempPathFactory, seen: dict[str, float]) -> Path:
+    with pytest.MonkeyPatch.context() as patch:
+        largest = _largest_seen(patch)
+        code, folder = _run(tmp_path_factory.mktemp("seed3") / "run", "--seed", "3")
     assert code == 0
+    seen.update(largest)
     return folder
 
 
@@ -127,20 +178,58 @@ def test_the_figure_is_there_and_nothing_is_overwritten(done: Path, capsys: pyte
     assert {path.name: path.read_bytes()[:64] for path in done.iterdir()} == before
 
 
-def test_the_same_seed_gives_the_same_numbers_and_another_seed_others(done: Path, tmp_path: Path) -> None:
+def test_the_run_shows_what_was_predicted(done: Path, seen: dict[str, float]) -> None:
+    """Every maximum lies below its prediction for 95 % of the specimens, and not below 75 % of the assumed one's."""
+    with h5py.File(done / "campaign.h5", "r") as file:
+        entry = file["entry"]
+        volts = entry["instrument/drive/voltage"][:]
+        seen["drive_voltage"] = float(np.abs(volts).max())
+        blocks = entry["instrument/blocks"]
+        armed = blocks["row"][:][np.flatnonzero(np.diff(blocks["run"][:])) + 1]
+        runs = np.split(volts, armed)
+        seen["drive_slew"] = max(float(np.abs(np.diff(run)).max()) for run in runs) * 2000.0
+        names = [name.decode() for name in entry["preflight/quantity"][:]]
+        assert len(names) == 11
+        assert list(entry["preflight/margin"][:]) == sorted(entry["preflight/margin"][:])
+        assert entry["planned_drive/omega"].shape[0] > 20
+        stored = entry["metadata/plan_hash"][()].decode()
+    assert _summary(done)["plan_hash"] == stored
+    configuration = BenchConfiguration(simulation=Simulation(seed=3))
+    campaign = HarmonicCampaign(HarmonicParameters(omega=(OMEGA,), beta=(BETA,)), configuration)
+    found = compile_run("harmonic", campaign, Path())
+    assert found.plan_hash == stored
+    demands = {each.bound.quantity: each.demand for each in found.margins}
+    lasers = [demands.pop("laser_1"), demands.pop("laser_2")]
+    demands["laser_range"] = max(lasers, key=lambda demand: demand.value or 0.0)
+    assert demands.keys() == seen.keys()
+    for quantity, demand in demands.items():
+        assert demand.value is not None
+        assert demand.likely is not None
+        assert 0.75 * demand.value <= seen[quantity] <= demand.likely, quantity
+
+
+def test_the_same_seed_gives_the_same_numbers(done: Path, tmp_path: Path) -> None:
+    """And what watched the first run changed nothing."""
     _run(tmp_path / "again", "--seed", "3")
-    _run(tmp_path / "other", "--seed", "4")
     assert _summary(tmp_path / "again")["points"] == _summary(done)["points"]
+
+
+@pytest.mark.soak
+def test_another_seed_gives_other_numbers(done: Path, tmp_path: Path) -> None:
+    _run(tmp_path / "other", "--seed", "4")
     other, first = (_summary(folder)["points"][0] for folder in (tmp_path / "other", done))
     assert other["alpha_2"] != first["alpha_2"]
     assert other["alpha_2"] == pytest.approx(first["alpha_2"], rel=0.02)
 
 
+QUICK = "[acquisition]\nblock_duration = 0.2\n[simulation.bench]\nsample_rate = 1000.0\n"
+
+
 def test_a_specimen_that_is_not_as_assumed_is_flagged(tmp_path: Path) -> None:
     configuration = tmp_path / "differs.toml"
     sure = "[uncertainty]\nstiffness = 0.005\ndamping = 0.02\nrestitution = 0.001\nspring = 0.005\n"
-    configuration.write_text(f"{sure}[simulation.specimen.frame]\nk2 = 60.0\n", encoding="utf-8")
-    _, folder = _run(tmp_path / "run", "--config", str(configuration))
+    configuration.write_text(f"{QUICK}{sure}[simulation.specimen.frame]\nk2 = 60.0\n", encoding="utf-8")
+    _, folder = _run(tmp_path / "run", "--measured-cycles", "8", "--config", str(configuration))
     (point,) = _summary(folder)["points"]
     assert point["agrees"] is False
     assert "difference from the prediction exceeds" in point["reason"]

@@ -19,7 +19,7 @@ from sim.knowledge import SpecimenKnowledge
 from sim.rocking import Motion, simulate
 from sim.specimen import Specimen
 from sim.steady import Orbit, rocking_orbit
-from tests.protocols.harmonic.scripted import BETA, OMEGA, Script, cycle
+from tests.protocols.harmonic.scripted import BETA, OMEGA, PARAMETERS, Script, cycle
 
 AMPLITUDE = 1.01 * 9.81 / 8.0
 
@@ -43,7 +43,15 @@ def _orbit(specimen: Specimen, omega: float) -> Orbit:
 
 
 @pytest.mark.parametrize(
-    ("omega", "beta"), [(12.5, 0.25), (17.5, 0.64), (20.0, 0.64), (12.5, 0.97), (17.5, 0.97), (20.0, 0.97)]
+    ("omega", "beta"),
+    [
+        (12.5, 0.25),
+        (20.0, 0.64),
+        *(
+            pytest.param(*each, marks=pytest.mark.soak)
+            for each in ((17.5, 0.64), (12.5, 0.97), (17.5, 0.97), (20.0, 0.97))
+        ),
+    ],
 )
 def test_the_first_start_leads_to_the_orbit(omega: float, beta: float) -> None:
     specimen = Specimen().coupled(beta)
@@ -78,7 +86,7 @@ def test_where_the_orbit_is_unstable_a_start_only_has_to_keep_the_block_standing
     assert plan_starts(specimen, 15.0, AMPLITUDE, orbit, 2)[0].chance > 0.5
 
 
-@pytest.mark.parametrize("rank", [0, 5])
+@pytest.mark.parametrize("rank", [pytest.param(0, marks=pytest.mark.soak), 5])
 def test_the_stated_chance_is_what_other_draws_find(rank: int) -> None:
     """Other specimens, a longer dwell, a narrower criterion: as many reach their own orbit, within 3 sigma."""
     specimen, n = Specimen().coupled(0.97), 60
@@ -95,11 +103,17 @@ def test_the_stated_chance_is_what_other_draws_find(rank: int) -> None:
     assert abs(reached / n - start.chance) < 3.0 * spread + 1.0 / RATING
 
 
-def test_a_chance_is_never_certain_and_the_same_question_has_the_same_answer() -> None:
+@pytest.fixture(scope="module")
+def usual() -> list[Start]:
+    """Six starts at beta = 0.97 and 20 rad/s."""
     specimen = Specimen().coupled(0.97)
-    orbit = _orbit(specimen, 12.5)
-    first, second = (plan_starts(specimen, 12.5, AMPLITUDE, orbit, 6) for _ in range(2))
-    assert first == second
+    return plan_starts(specimen, 20.0, AMPLITUDE, _orbit(specimen, 20.0), 6)
+
+
+def test_a_chance_is_never_certain_and_the_same_question_has_the_same_answer(usual: list[Start]) -> None:
+    specimen = Specimen().coupled(0.97)
+    first = plan_starts(specimen, 20.0, AMPLITUDE, _orbit(specimen, 20.0), 6)
+    assert first == usual
     for start in first:
         successes = start.chance * (RATING + 2) - 1.0
         assert successes == pytest.approx(round(successes), abs=1e-9)
@@ -139,7 +153,7 @@ def simulations(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     return counted
 
 
-@pytest.mark.parametrize(("beta", "omega"), [(0.25, 15.0), (0.97, 15.0)])
+@pytest.mark.parametrize(("beta", "omega"), [pytest.param(0.25, 15.0, marks=pytest.mark.soak), (0.97, 15.0)])
 def test_candidates_that_cannot_be_chosen_any_more_are_not_simulated(
     beta: float, omega: float, simulations: list[int]
 ) -> None:
@@ -167,11 +181,11 @@ def test_a_plan_is_remembered_by_a_later_run(
     assert sum(simulations) > 0
 
 
-def test_a_specimen_that_is_known_worse_has_smaller_chances() -> None:
+def test_a_specimen_that_is_known_worse_has_smaller_chances(usual: list[Start]) -> None:
     specimen = Specimen().coupled(0.97)
     orbit = _orbit(specimen, 20.0)
     wide = SpecimenKnowledge(stiffness=0.2, damping=0.5, restitution=0.02, spring=0.4)
-    usual, doubtful = (plan_starts(specimen, 20.0, AMPLITUDE, orbit, 6, each) for each in (None, wide))
+    doubtful = plan_starts(specimen, 20.0, AMPLITUDE, orbit, 6, wide)
     assert sum(start.chance for start in doubtful) < sum(start.chance for start in usual) - 0.5
 
 
@@ -195,10 +209,18 @@ def _chances_said(script: Script) -> list[str]:
     return [text.rpartition("chance ")[2] for text in said if "start " in text]
 
 
-def test_the_protocol_says_the_chance_of_each_start_and_keeps_that_of_the_one_that_was_measured() -> None:
+@pytest.fixture(scope="module")
+def planned() -> list[Start]:
+    """The starts of the scripted campaign."""
+    specimen = Specimen().coupled(BETA)
+    return plan_starts(specimen, OMEGA, AMPLITUDE, _orbit(specimen, OMEGA), PARAMETERS.starts)
+
+
+def test_the_protocol_says_the_chance_of_each_start_and_keeps_that_of_the_one_that_was_measured(
+    planned: list[Start],
+) -> None:
     specimen = Specimen().coupled(BETA)
     orbit = _orbit(specimen, OMEGA)
-    planned = plan_starts(specimen, OMEGA, AMPLITUDE, orbit, 3)
     bare = predict_gain(specimen, OMEGA, AMPLITUDE).bare.drift
     script = Script(lambda start, k: None if start == 1 else cycle(k, orbit.peaks.drift, orbit.peaks.u1), bare)
     (point,) = script.run()
@@ -207,10 +229,10 @@ def test_the_protocol_says_the_chance_of_each_start_and_keeps_that_of_the_one_th
     assert point.start_chance == planned[1].chance
 
 
-def test_a_point_at_which_the_block_always_fell_keeps_the_chance_of_the_best_start() -> None:
+def test_a_point_at_which_the_block_always_fell_keeps_the_chance_of_the_best_start(planned: list[Start]) -> None:
     specimen = Specimen().coupled(BETA)
     found = predict_gain(specimen, OMEGA, AMPLITUDE)
     assert found.rocking is not None
     (point,) = Script(lambda *_: None, found.bare.drift).run()
     assert point.status is PointStatus.OVERTURNED
-    assert point.start_chance == plan_starts(specimen, OMEGA, AMPLITUDE, found.rocking.orbit, 1)[0].chance
+    assert point.start_chance == planned[0].chance
