@@ -55,7 +55,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("off")
     frame = "".join(f"{name} = {truth()[name]!r}\n" for name in FACTORS)
     (path / "bench.toml").write_text(
-        f"[simulation]\nspring_factor = {SPRING}\n[simulation.specimen.frame]\n{frame}"
+        f"[acquisition]\nblock_duration = 0.2\n[simulation]\nspring_factor = {SPRING}\n"
+        f"[simulation.specimen.frame]\n{frame}"
         f"[simulation.specimen.block]\nrestitution_factor = {RESTITUTION}\n",
         encoding="utf-8",
     )
