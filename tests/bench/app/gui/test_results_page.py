@@ -22,7 +22,7 @@ from bench.app.gui.outputs import free
 from bench.app.gui.results_page import ResultsPage
 from bench.app.ipc.messages import Ended
 from protocols.harmonic.protocol import PointStatus
-from tests.bench.app.gui.run_files import counts, made, point, settle, show
+from tests.bench.app.gui.run_files import close_files, counts, made, point, settle, show
 from tests.patience import LONG_MS
 
 
@@ -63,9 +63,7 @@ def page(one_page: ResultsPage) -> Generator[ResultsPage]:
     one_page.show_run()
     one_page.parts.setCurrentIndex(0)
     yield one_page
-    while one_page.files.count():
-        one_page.files.setCurrentRow(0)
-        one_page.files.remove_chosen()
+    close_files(one_page)
     one_page.everything.setChecked(False)
 
 

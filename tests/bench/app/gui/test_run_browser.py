@@ -24,7 +24,7 @@ from bench.config.model import BenchConfiguration
 from bench.datafile.reader import open_datafile
 from bench.events import PointFinished
 from sim.specimen import Specimen
-from tests.bench.app.gui.run_files import begun, made, point, settle
+from tests.bench.app.gui.run_files import begun, close_files, made, point, settle
 from tests.patience import LONG_MS
 
 AGREES = {"alpha_2_predicted": 0.199, "alpha_2_predicted_uncertainty": 0.002, "agrees": True}
@@ -78,9 +78,7 @@ def page(one_page: ResultsPage, folder: Path, qtbot: QtBot) -> Generator[Results
     browser = one_page.browser
     _wait(browser, qtbot, 4)
     yield one_page
-    while one_page.files.count():
-        one_page.files.setCurrentRow(0)
-        one_page.files.remove_chosen()
+    close_files(one_page)
     browser.search.clear()
     browser.table.sortByColumn(run_browser.DATE, Qt.SortOrder.DescendingOrder)
     browser.use_folder(folder)
