@@ -31,7 +31,7 @@ from bench.app.gui.palette import dress
 from bench.app.gui.results_page import ResultsPage
 from bench.app.gui.window import FIRST, Window
 from bench.app.queue.queue import Queue, Queued
-from tests.bench.app.gui.run_files import close_files
+from tests.bench.app.gui.run_files import close_files, settle
 from tests.bench.app.ipc.experiment import SHAKING, bench
 
 PROTOCOLS = tuple(each for each in all_protocols()[0] if each.name != SHAKING.name)
@@ -151,6 +151,7 @@ def _put_back(window: Window) -> bool:
     if isinstance(window.run, NoPlots):
         window.run.predicted.clear()
     if isinstance(window.results, ResultsPage):
+        settle(window.results)
         if window.results.files.count():
             close_files(window.results)
         window.results.views.setCurrentWidget(window.results.browser)
