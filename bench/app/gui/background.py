@@ -28,6 +28,12 @@ _files = ReadingProcess()
 _threads = WeakSet[Thread]()
 
 
+class _Answers(QObject):
+    """Emits from the thread. It belongs to no window: the thread keeps it while it may still emit."""
+
+    done = Signal(int, object)
+
+
 class Reader(QObject):
     """Calls functions in a thread, one at a time; `found` emits the result of the last call only, in the window's
     thread. The functions must not use widgets, which the slots of `found` may update.
@@ -37,15 +43,15 @@ class Reader(QObject):
     """Emits the value that the function returned, or the error that it raised. Errors other than RockbenchError and
     OSError are raised in the window's thread as well.
     """
-    _done = Signal(int, object)
 
     def __init__(self, parent: QObject) -> None:
         super().__init__(parent)
+        self._answers = _Answers()
         self._latest = self._told = 0
         self._lock = Lock()
         self._waiting: tuple[int, Callable[[], object]] | None = None
         self._busy = False
-        self._done.connect(self._tell)
+        self._answers.done.connect(self._tell)
 
     @property
     def busy(self) -> bool:
@@ -78,9 +84,9 @@ class Reader(QObject):
             except Exception as error:
                 # reported by the window's thread, like every error
                 answer = error
-            # the window may have been closed
+            # the application may have ended
             with suppress(RuntimeError):
-                self._done.emit(number, answer)
+                self._answers.done.emit(number, answer)
 
     def _tell(self, number: int, answer: object) -> None:
         if number == self._latest:

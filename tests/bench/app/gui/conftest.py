@@ -5,22 +5,15 @@ from math import inf
 from pathlib import Path
 
 import pytest
-from PySide6.QtWidgets import QApplication, QWidget
+from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
 from bench.app import catalogue
-from bench.app.catalogue import all_protocols
-from bench.app.display.theme import LIGHT
-from bench.app.gui.controller import Controller
 from bench.app.gui.header import StopFilter
-from bench.app.gui.palette import dress
 from bench.app.gui.window import Window
 from bench.app.ipc.messages import FromSession, PlanCheck
-from tests.bench.app.ipc.experiment import SHAKING, bench
+from tests.bench.app.gui.shared_window import SHARED, NoPlots, delete_closed
 from tests.installed import installed
-
-PROTOCOLS = tuple(each for each in all_protocols()[0] if each.name != SHAKING.name)
-"""Those of the project."""
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -61,6 +54,18 @@ class ScriptedClient:
         return said
 
 
+@pytest.fixture(scope="package", autouse=True)
+def _the_shared_window_is_closed() -> Generator[None]:
+    yield
+    SHARED.close()
+
+
+@pytest.fixture(autouse=True)
+def _closed_windows_are_deleted() -> Generator[None]:
+    yield
+    delete_closed()
+
+
 @pytest.fixture(autouse=True)
 def _messages_are_handled_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """On a slow machine too, one call of `_look` handles all that a test has put."""
@@ -73,19 +78,6 @@ def spoken(monkeypatch: pytest.MonkeyPatch) -> type[ScriptedClient]:
     # the client of an earlier test in this process
     monkeypatch.delattr(ScriptedClient, "latest", raising=False)
     return ScriptedClient
-
-
-class NoPlots(QWidget):
-    """Stands in for the pages with plots, which take most of the time that a window needs to come."""
-
-    def __init__(self, *_given: object) -> None:
-        super().__init__()
-        self.predicted: list[object] = []
-
-    def predict(self, prediction: object) -> None:
-        self.predicted.append(prediction)
-
-    def reuse_through(self, setup: object) -> None: ...
 
 
 @pytest.fixture
@@ -102,18 +94,12 @@ def without_live_plots(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def window(qtbot: QtBot, qapp: QApplication, tmp_path: Path) -> Generator[Window, None, None]:
     """The window, in front, with the filter of STOP that the application has."""
-    # built without a theme, as by the program: with one, every insertion of a widget would style its children again
-    qapp.setStyleSheet("")
-    controller = Controller()
-    shown = Window(controller, bench(), (SHAKING, *PROTOCOLS), LIGHT)
-    dress(qapp, LIGHT)
-    key = StopFilter(controller, shown.header.stop)
+    shown = SHARED.take()
+    key = StopFilter(shown._controller, shown.header.stop)
     qapp.installEventFilter(key)
     shown.protocol.folder.setText(str(tmp_path / "run"))
-    qtbot.addWidget(shown)
-    shown.show()
     with qtbot.waitActive(shown):
         shown.activateWindow()
     yield shown
     qapp.removeEventFilter(key)
-    shown.leave()
+    SHARED.give_back()

@@ -69,9 +69,10 @@ def main(width: int, height: int, theme: str) -> int:
     """Show every page on a screen of this size [px]; prints and counts what is clipped."""
     os.environ["ROCKBENCH_SESSIONS"] = "off"
     application = QApplication([])
-    dress(application, THEMES[theme])
     controller = Controller()
     window = Window(controller, BenchConfiguration(), all_protocols()[0], THEMES[theme], presets=Path("never"))
+    # after the window is built, as in the program
+    dress(application, THEMES[theme])
     scale = window.devicePixelRatioF()
     window.resize(max(int(width / scale), SMALLEST[0]), max(int(height / scale) - TITLE_BAR, SMALLEST[1]))
     window.show()

@@ -46,6 +46,19 @@ def made(folder: Path, *points: HarmonicPoint, **about: str) -> Path:
     return path
 
 
+def close_files(page: ResultsPage) -> None:
+    """Take all files off the Results page, without a look at those that remain after each."""
+    settle(page)
+    files = page.files
+    files.blockSignals(True)
+    files._files.clear()
+    files.clear()
+    files.blockSignals(False)
+    files.chosen_changed.emit()
+    files.ticked_changed.emit()
+    settle(page)
+
+
 def begun(folder: Path, **about: str) -> tuple[Path, Recorder]:
     """A file with samples that is still open, and its recorder."""
     folder.mkdir(parents=True)

@@ -11,7 +11,7 @@ from bench.app.catalogue import load_protocol
 from bench.app.ipc.broadcast import Reduction
 from bench.app.ipc.messages import FromSession, Opened, Published, Run, Traces
 from bench.config.model import BenchConfiguration
-from bench.config.sections import Simulation
+from bench.config.sections import Acquisition, Simulation
 from bench.engine.engine import configured_engine
 from bench.engine.interface import EventStream, Requests, Unattended
 from bench.events import Acquired, Event, ValuesReceived
@@ -82,7 +82,9 @@ class ShortRun:
 def short_run(name: str) -> ShortRun:
     """Carry out the protocol on a simulated bench; raises AssertionError unless the run is completed."""
     simulation = Simulation(bench=_bench(name), seed=3)
-    configuration = BenchConfiguration(simulation=simulation)
+    # in few blocks, but for the protocol whose corrections must come within a cycle
+    acquisition = Acquisition() if name == "stability" else Acquisition(block_duration=0.2, lead=0.2)
+    configuration = BenchConfiguration(simulation=simulation, acquisition=acquisition)
     protocol = load_protocol(name)
     prepared = protocol.prepare(PARAMETERS[name], configuration, None)
     rig = SimulatedRig(

@@ -12,12 +12,10 @@ from pathlib import Path
 
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
 from bench.app.display.theme import LIGHT
 from bench.app.gui.controller import Controller
-from bench.app.gui.palette import dress
 from bench.app.gui.window import Window
 from bench.app.ipc.messages import Ask, Attached, receive
 from bench.app.ipc.server import SessionServer
@@ -25,6 +23,7 @@ from bench.app.ipc.sessions import running_sessions
 from bench.datafile.reader import open_datafile
 from bench.engine.interface import Requests
 from bench.events import StepStarted
+from tests.bench.app.gui.shared_window import undressed
 from tests.bench.app.ipc.experiment import SHAKING, bench, order
 from tests.patience import LONG_MS
 
@@ -46,20 +45,20 @@ def session(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Generator[subpro
         client.kill()
 
 
-def opened(qtbot: QtBot, qapp: QApplication) -> Window:
-    dress(qapp, LIGHT)
-    window = Window(Controller(), bench(), (SHAKING,), LIGHT)
+def opened(qtbot: QtBot) -> Window:
+    with undressed():
+        window = Window(Controller(), bench(), (SHAKING,), LIGHT)
     qtbot.addWidget(window)
     window.show()
     return window
 
 
 def test_a_window_after_a_killed_one_has_state_log_and_stop(
-    session: subprocess.Popen[str], qtbot: QtBot, qapp: QApplication, tmp_path: Path
+    session: subprocess.Popen[str], qtbot: QtBot, tmp_path: Path
 ) -> None:
     session.send_signal(signal.SIGKILL)
     session.wait()
-    window = opened(qtbot, qapp)
+    window = opened(qtbot)
     began = time.monotonic()
     controller = window.header._controller  # pyright: ignore[reportPrivateUsage]
     qtbot.waitUntil(lambda: window.header.word.text() == "RUNNING", timeout=LONG_MS)
@@ -80,8 +79,8 @@ def test_a_window_after_a_killed_one_has_state_log_and_stop(
 
 
 @pytest.mark.usefixtures("session")
-def test_a_second_window_only_watches_and_stops(qtbot: QtBot, qapp: QApplication, tmp_path: Path) -> None:
-    window = opened(qtbot, qapp)
+def test_a_second_window_only_watches_and_stops(qtbot: QtBot, tmp_path: Path) -> None:
+    window = opened(qtbot)
     controller = window.header._controller  # pyright: ignore[reportPrivateUsage]
     qtbot.waitUntil(lambda: window.header.word.text() == "RUNNING", timeout=LONG_MS)
     assert not controller.session.controls

@@ -56,6 +56,7 @@ def test_state_step_time_and_inputs_are_shown(window: Window, link: ScriptedClie
     assert header.progress.value() == 250
 
 
+@NO_PLOTS
 def test_a_session_that_plans_is_not_idle_and_time_left_counts_down(window: Window, link: ScriptedClient) -> None:
     header = window.header
     link.said = [Preparing("planning the starts", 1, 4), Beat(State.IDLE, "", 0.0, 0, 0)]
@@ -82,23 +83,6 @@ def test_a_session_that_plans_is_not_idle_and_time_left_counts_down(window: Wind
     assert header.step.text() == "–", "nothing is under way"
 
 
-def test_stop_stays_in_its_place_whatever_is_said(window: Window, link: ScriptedClient, qtbot: QtBot) -> None:
-    window.resize(window.minimumSize())
-    qtbot.wait(50)
-    stop = window.header.stop
-    place = stop.mapTo(window, stop.rect().topLeft())
-    link.said = [
-        Published(StepStarted("a step with very much to say " * 12, time=1.0)),
-        Published(StateChanged(State.ARMED, State.WAITING, "a reason with very much to say " * 8, time=1.0)),
-        Question(1, "Mount the spring, and look at it from every side. " * 3),
-    ]
-    window._controller._look()
-    qtbot.waitUntil(window.prompt.isVisible, timeout=LONG_MS)
-    qtbot.wait(100)
-    assert stop.mapTo(window, stop.rect().topLeft()) == place
-    assert window.width() == window.minimumWidth()
-
-
 @NO_PLOTS
 def test_silence_is_shown_as_no_link(window: Window, link: ScriptedClient) -> None:
     link.said = [Beat(State.RUNNING, "the sine begins", 1.0, 0, 0)]
@@ -121,6 +105,65 @@ def test_a_dead_session_says_what_happened_and_what_to_do(window: Window, link: 
     assert (window.header.word.text(), window.header.lamp.shape) == (texts.FAILED_WORD, "cross")
     assert window.pages.currentWidget() is window.results
     assert not window._controller.running
+
+
+@pytest.mark.usefixtures("without_live_plots", "window")
+def test_the_main_loop_keeps_the_link_alive(link: ScriptedClient, qtbot: QtBot) -> None:
+    qtbot.waitUntil(lambda: link.beats >= 3, timeout=LONG_MS)
+
+
+@NO_PLOTS
+def test_a_session_that_plans_on_a_busy_computer_is_not_lost(window: Window, link: ScriptedClient) -> None:
+    """No rig is open: the state is known. A process that has died is lost."""
+    link.said = [Preparing("simulating starts", 1, 4)]
+    window._controller._look()
+    link.status, link.silence = "no link", 2.4
+    window.header.refresh()
+    assert window.header.word.text() == "PLANNING"
+    assert "no message for 2 s" in window.header.reason.text()
+    link.lives = False
+    window.header.refresh()
+    assert window.header.word.text() == "NO LINK"
+
+
+@NO_PLOTS
+def test_closing_asks_while_a_run_is_driven(window: Window, link: ScriptedClient, qtbot: QtBot) -> None:
+    window.close()
+    assert window.isVisible()
+    assert link.asked == []
+    assert QApplication.activeModalWidget() is None
+    assert window.leave_panel.question.text() == texts.LEAVE_RAMPS_OUT
+    qtbot.mouseClick(window.leave_panel.stay, Qt.MouseButton.LeftButton)
+    assert not window.leave_panel.isVisible()
+    window.close()
+    qtbot.mouseClick(window.leave_panel.close_window, Qt.MouseButton.LeftButton)
+    assert not window.isVisible()
+    assert link.asked == ["leave"]
+
+
+@NO_PLOTS
+def test_closing_asks_nothing_when_the_run_is_over(window: Window, link: ScriptedClient) -> None:
+    link.said = [Ended("completed", "the plan was carried out", {}, "", Path("never"))]
+    window._controller._look()
+    window.close()
+    assert not window.isVisible()
+
+
+def test_stop_stays_in_its_place_whatever_is_said(window: Window, link: ScriptedClient, qtbot: QtBot) -> None:
+    window.resize(window.minimumSize())
+    qtbot.wait(50)
+    stop = window.header.stop
+    place = stop.mapTo(window, stop.rect().topLeft())
+    link.said = [
+        Published(StepStarted("a step with very much to say " * 12, time=1.0)),
+        Published(StateChanged(State.ARMED, State.WAITING, "a reason with very much to say " * 8, time=1.0)),
+        Question(1, "Mount the spring, and look at it from every side. " * 3),
+    ]
+    window._controller._look()
+    qtbot.waitUntil(window.prompt.isVisible, timeout=LONG_MS)
+    qtbot.wait(100)
+    assert stop.mapTo(window, stop.rect().topLeft()) == place
+    assert window.width() == window.minimumWidth()
 
 
 def test_a_beat_tells_the_state_when_the_change_was_lost(window: Window, link: ScriptedClient) -> None:
@@ -176,45 +219,3 @@ def test_check_and_start_are_in_view_on_small_screens(window: Window, qtbot: QtB
             place = QRect(button.mapTo(window, QPoint(0, 0)), button.size())
             assert window.rect().contains(place)
             assert button.visibleRegion().boundingRect() == button.rect()
-
-
-@NO_PLOTS
-def test_closing_asks_while_a_run_is_driven(window: Window, link: ScriptedClient, qtbot: QtBot) -> None:
-    window.close()
-    assert window.isVisible()
-    assert link.asked == []
-    assert QApplication.activeModalWidget() is None
-    assert window.leave_panel.question.text() == texts.LEAVE_RAMPS_OUT
-    qtbot.mouseClick(window.leave_panel.stay, Qt.MouseButton.LeftButton)
-    assert not window.leave_panel.isVisible()
-    window.close()
-    qtbot.mouseClick(window.leave_panel.close_window, Qt.MouseButton.LeftButton)
-    assert not window.isVisible()
-    assert link.asked == ["leave"]
-
-
-@NO_PLOTS
-def test_closing_asks_nothing_when_the_run_is_over(window: Window, link: ScriptedClient) -> None:
-    link.said = [Ended("completed", "the plan was carried out", {}, "", Path("never"))]
-    window._controller._look()
-    window.close()
-    assert not window.isVisible()
-
-
-@pytest.mark.usefixtures("without_live_plots", "window")
-def test_the_main_loop_keeps_the_link_alive(link: ScriptedClient, qtbot: QtBot) -> None:
-    qtbot.waitUntil(lambda: link.beats >= 3, timeout=LONG_MS)
-
-
-@NO_PLOTS
-def test_a_session_that_plans_on_a_busy_computer_is_not_lost(window: Window, link: ScriptedClient) -> None:
-    """No rig is open: the state is known. A process that has died is lost."""
-    link.said = [Preparing("simulating starts", 1, 4)]
-    window._controller._look()
-    link.status, link.silence = "no link", 2.4
-    window.header.refresh()
-    assert window.header.word.text() == "PLANNING"
-    assert "no message for 2 s" in window.header.reason.text()
-    link.lives = False
-    window.header.refresh()
-    assert window.header.word.text() == "NO LINK"

@@ -13,7 +13,8 @@ from bench.app.gui.help_panel import reference_page, reference_text
 from bench.app.gui.window import Window
 from bench.config.declared import declared
 from bench.protocol import Protocol
-from tests.bench.app.gui.conftest import PROTOCOLS, ScriptedClient
+from tests.bench.app.gui.conftest import ScriptedClient
+from tests.bench.app.gui.shared_window import PROTOCOLS
 
 pytestmark = pytest.mark.usefixtures("without_plots", "spoken")
 

@@ -28,8 +28,9 @@ from bench.app.gui.header import StopButton
 from bench.app.gui.window import Window
 from bench.app.ipc.messages import Question
 from bench.app.queue.queue import Queued
-from tests.bench.app.gui.conftest import PROTOCOLS, SHAKING, ScriptedClient
-from tests.bench.app.ipc.experiment import bench, order
+from tests.bench.app.gui.conftest import ScriptedClient
+from tests.bench.app.gui.shared_window import PROTOCOLS, undressed
+from tests.bench.app.ipc.experiment import SHAKING, bench, order
 from tests.patience import LONG_MS
 
 OPERATED = (QAbstractButton, QLineEdit, QComboBox, QAbstractSpinBox, QAbstractItemView, QPlainTextEdit, QTabBar)
@@ -123,7 +124,8 @@ def test_a_layout_is_remembered(qtbot: QtBot, tmp_path_factory: pytest.TempPathF
     settings = QSettings(str(tmp_path_factory.mktemp("kept") / "kept.ini"), QSettings.Format.IniFormat)
 
     def opened() -> Window:
-        window = Window(Controller(), bench(), (SHAKING, *PROTOCOLS), LIGHT, settings=settings)
+        with undressed():
+            window = Window(Controller(), bench(), (SHAKING, *PROTOCOLS), LIGHT, settings=settings)
         qtbot.addWidget(window)
         window.show()
         return window

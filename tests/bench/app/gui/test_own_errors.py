@@ -16,8 +16,8 @@ from bench.app.gui.controller import Controller
 from bench.app.gui.header import KEY
 from bench.app.gui.trouble import TroublePanel
 from bench.app.gui.window import Window, attend
-from tests.bench.app.gui.conftest import SHAKING
-from tests.bench.app.ipc.experiment import bench
+from tests.bench.app.gui.shared_window import undressed
+from tests.bench.app.ipc.experiment import SHAKING, bench
 from tests.patience import LONG_MS
 
 pytestmark = pytest.mark.usefixtures("without_plots", "spoken")
@@ -90,7 +90,8 @@ def test_the_same_error_is_told_once_and_never_in_place_of_the_bench(
 
 def test_the_program_has_the_filter_of_stop(qtbot: QtBot, qapp: QApplication) -> None:
     controller = Controller()
-    shown = Window(controller, bench(), (SHAKING,), LIGHT)
+    with undressed():
+        shown = Window(controller, bench(), (SHAKING,), LIGHT)
     qtbot.addWidget(shown)
     undo = attend(shown, controller, qapp)
     shown.show()

@@ -11,9 +11,10 @@ from pytestqt.qtbot import QtBot
 from bench.app.catalogue import all_protocols
 from bench.app.display.theme import DARK, LIGHT, Theme
 from bench.app.gui.controller import Controller
-from bench.app.gui.palette import chosen_theme, dress, qt_palette, style_sheet
+from bench.app.gui.palette import chosen_theme, qt_palette, style_sheet
 from bench.app.gui.window import Window, follow_choice
 from bench.config.model import BenchConfiguration
+from tests.bench.app.gui.shared_window import undressed
 
 
 def _luminance(colour: QColor) -> float:
@@ -54,24 +55,24 @@ def test_the_formula_is_the_published_one() -> None:
     assert _contrast(QColor("#767676"), QColor("white")) == pytest.approx(4.54, abs=0.01)
 
 
-def test_a_theme_chosen_by_hand_is_kept(qtbot: QtBot, tmp_path: Path) -> None:
-    application = QApplication.instance()
-    assert isinstance(application, QApplication)
+@pytest.mark.usefixtures("without_plots")
+def test_a_theme_chosen_by_hand_is_kept(qtbot: QtBot, qapp: QApplication, tmp_path: Path) -> None:
     settings = QSettings(str(tmp_path / "kept.ini"), QSettings.Format.IniFormat)
     controller = Controller()
-    try:
+
+    def opened() -> Window:
+        window = Window(controller, BenchConfiguration(), all_protocols()[0], LIGHT)
+        qtbot.addWidget(window)
+        follow_choice(window, qapp, settings)
+        return window
+
+    with undressed():
         for chosen in ("dark", "light"):
-            window = Window(controller, BenchConfiguration(), all_protocols()[0], LIGHT)
-            qtbot.addWidget(window)
-            follow_choice(window, application, settings)
+            window = opened()
             window.setup.theme.setCurrentIndex(window.setup.theme.findData(chosen))
-            assert application.styleSheet() == style_sheet(chosen_theme(chosen))
+            assert qapp.styleSheet() == style_sheet(chosen_theme(chosen))
             assert settings.value("theme") == chosen
+            qapp.setStyleSheet("")
         assert chosen_theme("dark") is DARK
-        again = Window(controller, BenchConfiguration(), all_protocols()[0], LIGHT)
-        qtbot.addWidget(again)
-        follow_choice(again, application, settings)
-        assert again.setup.theme.currentData() == "light"
-    finally:
-        dress(application, LIGHT)
-        controller.close()
+        assert opened().setup.theme.currentData() == "light"
+    controller.close()

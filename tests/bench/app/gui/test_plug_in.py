@@ -6,28 +6,27 @@ from pathlib import Path
 
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QApplication, QLineEdit
+from PySide6.QtWidgets import QLineEdit
 from pytestqt.qtbot import QtBot
 
 from bench.app.catalogue import load_protocol
 from bench.app.display.theme import LIGHT
 from bench.app.formatting import measurement
 from bench.app.gui.controller import Controller
-from bench.app.gui.palette import dress
 from bench.app.gui.window import Window
 from bench.config.model import BenchConfiguration
-from tests.bench.app.gui.conftest import PROTOCOLS
+from tests.bench.app.gui.shared_window import PROTOCOLS, undressed
 from tests.installed import example
 from tests.patience import LONG_MS
 
 
 @pytest.fixture
-def window(qtbot: QtBot, qapp: QApplication, tmp_path: Path) -> Generator[Window]:
+def window(qtbot: QtBot, tmp_path: Path) -> Generator[Window]:
     """The window with the protocols of the project and the installed one, which its sessions find as well."""
-    dress(qapp, LIGHT)
     with example(tmp_path / "site", "tone_sweep"):
         entries = (*PROTOCOLS, load_protocol("tone-sweep"))
-        shown = Window(Controller(), BenchConfiguration(), entries, LIGHT)
+        with undressed():
+            shown = Window(Controller(), BenchConfiguration(), entries, LIGHT)
         qtbot.addWidget(shown)
         shown.show()
         yield shown

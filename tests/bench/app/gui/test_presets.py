@@ -15,13 +15,16 @@ from bench.app.display import texts
 from bench.app.display.theme import LIGHT
 from bench.app.gui.controller import Controller
 from bench.app.gui.form import Form
+from bench.app.gui.protocol_page import ProtocolPage
+from bench.app.gui.setup_page import SetupPage
 from bench.app.gui.window import Window
 from bench.app.ipc.messages import PlanChecked
 from bench.app.presets import LAST, Presets
 from bench.config.template import write_template
 from bench.protocol import Protocol
 from sim.errors import InvalidInput
-from tests.bench.app.gui.conftest import PROTOCOLS, ScriptedClient
+from tests.bench.app.gui.conftest import ScriptedClient
+from tests.bench.app.gui.shared_window import PROTOCOLS, undressed
 from tests.bench.app.ipc.experiment import bench
 
 pytestmark = pytest.mark.usefixtures("without_plots", "spoken")
@@ -31,11 +34,27 @@ FINE = PlanChecked((), None, (), 60.0, 1e6, 1e9, "hash", {})
 
 def _opened(qtbot: QtBot, folder: Path) -> Window:
     settings = QSettings(str(folder / "kept.ini"), QSettings.Format.IniFormat)
-    window = Window(Controller(), bench(), PROTOCOLS, LIGHT, settings=settings, presets=folder / "presets")
+    with undressed():
+        window = Window(Controller(), bench(), PROTOCOLS, LIGHT, settings=settings, presets=folder / "presets")
     qtbot.addWidget(window)
     window.show()
     window.pages.setCurrentWidget(window.protocol)
     return window
+
+
+def _page(qtbot: QtBot, folder: Path) -> ProtocolPage:
+    page = ProtocolPage(Controller(), bench(), PROTOCOLS, False, folder / "presets")
+    qtbot.addWidget(page)
+    page.show()
+    return page
+
+
+def _setup(qtbot: QtBot, folder: Path) -> SetupPage:
+    settings = QSettings(str(folder / "kept.ini"), QSettings.Format.IniFormat)
+    page = SetupPage(Controller(), bench(), None, LIGHT, settings)
+    qtbot.addWidget(page)
+    page.show()
+    return page
 
 
 def _line(form: Form, name: str) -> QLineEdit:
@@ -77,7 +96,7 @@ def test_checked_values_are_there_after_a_restart(qtbot: QtBot, tmp_path: Path, 
 
 
 def test_a_preset_is_saved_loaded_and_deleted(qtbot: QtBot, tmp_path: Path) -> None:
-    page = _opened(qtbot, tmp_path).protocol
+    page = _page(qtbot, tmp_path)
     bar = page.presets
     page.choice.setCurrentText("harmonic")
     assert bar.save.toolTip() == texts.PRESET_NO_NAME
@@ -108,7 +127,7 @@ def test_a_preset_that_was_not_loaded_is_replaced_after_a_second_press_only(qtbo
     file = tmp_path / "presets" / "harmonic" / "Monday.toml"
     file.parent.mkdir(parents=True)
     file.write_text("# by hand\nomega = [12.5]\n", encoding="utf-8")
-    page = _opened(qtbot, tmp_path).protocol
+    page = _page(qtbot, tmp_path)
     page.choice.setCurrentText("harmonic")
     page.presets.name.setEditText("monday")
     qtbot.mouseClick(page.presets.save, Qt.MouseButton.LeftButton)
@@ -125,7 +144,7 @@ def test_values_that_no_longer_hold_are_shown_with_the_reason(qtbot: QtBot, tmp_
     folder = tmp_path / "presets" / "free-vibration"
     folder.mkdir(parents=True)
     (folder / "old.toml").write_text('drift = 5.0\nexcitation = "hammer"\nrepeats = [1, 2]\npushes = 3\n', "utf-8")
-    page = _opened(qtbot, tmp_path).protocol
+    page = _page(qtbot, tmp_path)
     page.choice.setCurrentText("free-vibration")
     page.presets.name.setCurrentIndex(0)
     page.presets.name.activated.emit(0)
@@ -198,7 +217,7 @@ def test_a_damaged_file_is_reported_and_changes_nothing(qtbot: QtBot, tmp_path: 
     folder = tmp_path / "presets" / LAST
     folder.mkdir(parents=True)
     (folder / "harmonic.toml").write_text("omega = [", "utf-8")
-    page = _opened(qtbot, tmp_path).protocol
+    page = _page(qtbot, tmp_path)
     page.choice.setCurrentText("harmonic")
     assert page.form.parameters() == page.entry.parameters()
     qtbot.mouseClick(page.presets.last_values, Qt.MouseButton.LeftButton)
@@ -210,13 +229,11 @@ def test_recent_configurations_are_listed_and_opened(qtbot: QtBot, tmp_path: Pat
     paths = [tmp_path / f"bench-{name}.toml" for name in ("a", "b")]
     for path in paths:
         write_template(path, "minimal")
-    first = _opened(qtbot, tmp_path)
-    assert first.setup.recent.isHidden()
+    first = _setup(qtbot, tmp_path)
+    assert first.recent.isHidden()
     for path in paths:
-        first.setup.open_configuration(path)
-    first.leave()
-    second = _opened(qtbot, tmp_path)
-    setup = second.setup
+        first.open_configuration(path)
+    setup = _setup(qtbot, tmp_path)
     assert setup.recent.paths == [*reversed(paths)]
     assert setup.path is None
     setup.recent.activated.emit(1)

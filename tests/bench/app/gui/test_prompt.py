@@ -11,7 +11,7 @@ from pytestqt.qtbot import QtBot
 from bench.app.gui.panels import TASKS, UNKNOWN_TASK
 from bench.app.gui.window import Window
 from bench.app.ipc.messages import Published, Question
-from bench.events import OperatorAsked
+from bench.events import OperatorAsked, State, StateChanged
 from drivers.rig import OperatorTask
 from tests.bench.app.gui.conftest import ScriptedClient
 from tests.bench.app.ipc.experiment import order
@@ -75,3 +75,27 @@ def test_every_kind_of_work_says_why_and_what_is_checked(
     link.said = [Question(2, "Something else.")]
     window._controller._look()
     assert UNKNOWN_TASK[1] in window.prompt.parts[1].text()
+
+
+def test_a_question_is_inline_and_answered_once(window: Window, link: ScriptedClient, qtbot: QtBot) -> None:
+    link.said = [
+        Published(StateChanged(State.IDLE, State.WAITING, "a question", time=1.0)),
+        Question(7, "Mount the spring of beta = 0.4."),
+    ]
+    window._controller._look()
+    assert window.prompt.isVisible()
+    assert window.prompt.request.text() == "Mount the spring of β = 0.4."
+    assert QApplication.activeModalWidget() is None
+    qtbot.waitUntil(window.prompt.done.isEnabled, timeout=LONG_MS)
+    qtbot.mouseClick(window.prompt.done, Qt.MouseButton.LeftButton)
+    qtbot.mouseClick(window.prompt.done, Qt.MouseButton.LeftButton)
+    assert link.asked == [(7, True)]
+    assert not window.prompt.isVisible()
+
+
+def test_a_question_goes_when_the_bench_no_longer_waits(window: Window, link: ScriptedClient) -> None:
+    link.said = [Question(1, "Stand the block up.")]
+    window._controller._look()
+    link.said = [Published(StateChanged(State.WAITING, State.HALTED, "halt requested", time=1.0))]
+    window._controller._look()
+    assert not window.prompt.isVisible()

@@ -19,7 +19,8 @@ from bench.preflight.margins import Demand, Margin, bounds
 from bench.protocol import Protocol
 from protocols.harmonic.protocol import HarmonicParameters
 from sim.errors import Cause, InvalidInput
-from tests.bench.app.gui.conftest import PROTOCOLS, ScriptedClient
+from tests.bench.app.gui.conftest import ScriptedClient
+from tests.bench.app.gui.shared_window import PROTOCOLS
 from tests.bench.app.ipc.experiment import bench
 from tests.patience import LONG_MS
 

@@ -20,8 +20,9 @@ from bench.app.queue.file import LEFT, QueueFile
 from bench.app.queue.queue import Queued, Stage
 from bench.config.model import BenchConfiguration
 from sim.errors import Cause, InvalidInput
-from tests.bench.app.gui.conftest import PROTOCOLS, SHAKING, ScriptedClient
-from tests.bench.app.ipc.experiment import bench, order
+from tests.bench.app.gui.conftest import ScriptedClient
+from tests.bench.app.gui.shared_window import PROTOCOLS, undressed
+from tests.bench.app.ipc.experiment import SHAKING, bench, order
 from tests.patience import LONG_MS
 
 pytestmark = pytest.mark.usefixtures("without_plots")
@@ -399,7 +400,8 @@ def test_the_end_of_another_run_is_none_of_a_test(filled: Window, spoken: type[S
 
 
 def _window(qtbot: QtBot, queue: Path) -> Window:
-    window = Window(Controller(), bench(), (SHAKING, *PROTOCOLS), LIGHT, queue=queue)
+    with undressed():
+        window = Window(Controller(), bench(), (SHAKING, *PROTOCOLS), LIGHT, queue=queue)
     qtbot.addWidget(window)
     window.show()
     return window

@@ -69,6 +69,9 @@ def _start(folder: Path, screen: Screen) -> None:
     def begun() -> bool:
         # refused until the plan was checked
         screen.press("ctrl+Return")
+        if any(folder.glob("runs/*/campaign.h5")):
+            # a page that is not drawn anew 35 times per second
+            screen.press("ctrl+1")
         return _driven(folder)
 
     until(begun, "no run drove the table")

@@ -1,6 +1,8 @@
 """Files side by side: what is drawn and said is what the files hold, and nothing is overwritten."""
 
 import re
+import shutil
+from collections.abc import Generator
 from math import isnan, nan
 from pathlib import Path
 
@@ -8,6 +10,7 @@ import numpy as np
 import pytest
 from PySide6.QtCore import Qt, QUrl
 from PySide6.QtGui import QDesktopServices, QImage
+from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 from scipy.io import loadmat
 
@@ -19,7 +22,7 @@ from bench.app.gui.outputs import free
 from bench.app.gui.results_page import ResultsPage
 from bench.app.ipc.messages import Ended
 from protocols.harmonic.protocol import PointStatus
-from tests.bench.app.gui.run_files import counts, made, point, settle, show
+from tests.bench.app.gui.run_files import close_files, counts, made, point, settle, show
 from tests.patience import LONG_MS
 
 
@@ -32,16 +35,36 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     )
 
 
-@pytest.fixture
-def page(qtbot: QtBot) -> ResultsPage:
+@pytest.fixture(scope="module")
+def verdicts(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A point that agrees with its prediction, one that does not, and one that fell."""
+    told = {"alpha_2_predicted": 0.199, "alpha_2_predicted_uncertainty": 0.002, "agrees": True}
+    parts = '{"laser_scale": 0.001, "clock": 0.0005}'
+    good = point(16.0, 0.2).model_copy(update={**told, "uncertainty_parts": parts})
+    off = point(17.0, 0.3).model_copy(update={**told, "agrees": False, "status": PointStatus.MODULATED})
+    return made(tmp_path_factory.mktemp("verdicts") / "wednesday", good, off, point(18.0, None))
+
+
+@pytest.fixture(scope="module")
+def one_page(qapp: QApplication) -> Generator[ResultsPage]:  # noqa: ARG001 - Qt needs its application
     controller = Controller()
     shown = ResultsPage(controller, LIGHT)
-    qtbot.addWidget(shown)
     shown.resize(1200, 700)
-    shown.show_run()
     shown.show()
-    shown.destroyed.connect(controller.close)
-    return shown
+    yield shown
+    controller.close()
+    shown.close()
+    shown.deleteLater()
+
+
+@pytest.fixture
+def page(one_page: ResultsPage) -> Generator[ResultsPage]:
+    """The page without a file: those that a test opens are taken away again."""
+    one_page.show_run()
+    one_page.parts.setCurrentIndex(0)
+    yield one_page
+    close_files(one_page)
+    one_page.everything.setChecked(False)
 
 
 def test_differences_are_set_against_both_uncertainties() -> None:
@@ -57,12 +80,8 @@ def test_differences_are_set_against_both_uncertainties() -> None:
     assert compare(records, records)[0].point == "Kobe, β = 0.4"
 
 
-def test_every_point_has_its_verdict_in_six_columns(page: ResultsPage, tmp_path: Path) -> None:
-    told = {"alpha_2_predicted": 0.199, "alpha_2_predicted_uncertainty": 0.002, "agrees": True}
-    parts = '{"laser_scale": 0.001, "clock": 0.0005}'
-    good = point(16.0, 0.2).model_copy(update={**told, "uncertainty_parts": parts})
-    off = point(17.0, 0.3).model_copy(update={**told, "agrees": False, "status": PointStatus.MODULATED})
-    show(page, made(tmp_path / "wednesday", good, off, point(18.0, None)))
+def test_every_point_has_its_verdict_in_six_columns(page: ResultsPage, verdicts: Path) -> None:
+    show(page, verdicts)
 
     def cells(row: int) -> list[str]:
         items = [page.table.item(row, column) for column in range(page.table.columnCount())]
@@ -84,22 +103,21 @@ def test_every_point_has_its_verdict_in_six_columns(page: ResultsPage, tmp_path:
     assert any("laser scale 0.001; clock 0.0005" in text for text in shown)
 
 
-def test_the_verdict_of_the_run_is_above_its_points(page: ResultsPage, tmp_path: Path) -> None:
+def test_the_verdict_of_the_run_is_above_its_points(page: ResultsPage, verdicts: Path, tmp_path: Path) -> None:
     told = {"alpha_2_predicted": 0.199, "alpha_2_predicted_uncertainty": 0.002, "agrees": True}
     good = point(16.0, 0.2).model_copy(update=told)
-    off = point(17.0, 0.3).model_copy(update={**told, "agrees": False})
     show(page, made(tmp_path / "one", good))
     assert page.verdict.text().startswith("α₂ 0.2000 ± 0.0040 · predicted 0.1990 ± 0.0020")
     assert "✓ agrees" in page.verdict.text()
-    show(page, made(tmp_path / "two", good, off, point(18.0, None)))
+    show(page, verdicts)
     expected = "1 of 2 compared results agree with the prediction · ▲ DISAGREES: α₂ at ω = 17 rad/s, β = 0.4"
     assert page.verdict.text() == expected
     show(page, made(tmp_path / "none", point(18.0, None)))
     assert page.verdict.isHidden()
 
 
-def test_a_file_has_the_figures_of_its_folder(page: ResultsPage, tmp_path: Path) -> None:
-    path = made(tmp_path / "thursday", point(16.0, 0.2))
+def test_a_file_has_the_figures_of_its_folder(page: ResultsPage, files: tuple[Path, Path], tmp_path: Path) -> None:
+    path = shutil.copy(files[0], tmp_path / "campaign.h5")
     image = QImage(200, 100, QImage.Format.Format_RGB32)
     image.fill(Qt.GlobalColor.red)
     image.save(str(path.with_name("gain_spectra.png")))
@@ -113,7 +131,9 @@ def test_a_file_has_the_figures_of_its_folder(page: ResultsPage, tmp_path: Path)
     assert page.figures.picture.text() == texts.NO_FIGURE
 
 
-def test_the_normalised_errors_are_below_the_figure(page: ResultsPage, tmp_path: Path) -> None:
+def test_the_normalised_errors_are_below_the_figure(
+    page: ResultsPage, files: tuple[Path, Path], tmp_path: Path
+) -> None:
     told = {"alpha_2_predicted": 0.199, "alpha_2_predicted_uncertainty": 0.003, "agrees": True}
     good = point(16.0, 0.2).model_copy(update=told)
     off = point(17.0, 0.189).model_copy(update={**told, "agrees": False})
@@ -129,7 +149,7 @@ def test_the_normalised_errors_are_below_the_figure(page: ResultsPage, tmp_path:
     assert strip._item.viewRange()[1][0] < -2.0
     cells = [page.table.item(row - 1, 0).text() for row, _, _ in strip.scores]
     assert cells == ["ω = 16 rad/s, β = 0.4", "ω = 17 rad/s, β = 0.4"]
-    show(page, made(tmp_path / "alone", point(15.0, 0.3)))
+    show(page, files[1])
     assert strip.isHidden()
 
 
@@ -151,22 +171,21 @@ def test_two_files_are_drawn_together_and_compared(page: ResultsPage, files: tup
 
 
 def test_a_run_that_ends_takes_nobodys_comparison_away(
-    page: ResultsPage, files: tuple[Path, Path], tmp_path: Path
+    page: ResultsPage, files: tuple[Path, Path], verdicts: Path
 ) -> None:
     show(page, files[0])
-    last = made(tmp_path / "wednesday", point(16.0, 0.22))
     page.show_end(Ended("completed", "the plan was carried out", {}, "", files[1].parent))
     settle(page)
     assert [file.name for file in page.files.ticked] == ["tuesday"], "one file is no comparison"
     page.files.item(0).setCheckState(Qt.CheckState.Checked)
     chosen, before = page.files.chosen, page.gains.measured
-    page.show_end(Ended("aborted", "abort requested", {}, "", last.parent))
+    page.show_end(Ended("aborted", "abort requested", {}, "", verdicts.parent))
     settle(page)
     assert [file.name for file in page.files.ticked] == ["monday", "tuesday"]
     assert (page.files.chosen, page.gains.measured, page.files.count()) == (chosen, before, 3)
     assert "abort requested" in page.message.text()
     page.files.item(2).setCheckState(Qt.CheckState.Checked)
-    assert page.gains.measured[-1] == (16.0, 0.22)
+    assert page.gains.measured[-1] == (17.0, 0.3)
 
 
 def test_a_path_may_be_typed_and_a_wrong_one_changes_nothing(page: ResultsPage, files: tuple[Path, Path]) -> None:

@@ -4,11 +4,13 @@ import json
 import os
 import shutil
 import threading
+from collections.abc import Generator
 from pathlib import Path
 
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QImage
+from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
 from bench.app.display import run_list, texts
@@ -22,7 +24,7 @@ from bench.config.model import BenchConfiguration
 from bench.datafile.reader import open_datafile
 from bench.events import PointFinished
 from sim.specimen import Specimen
-from tests.bench.app.gui.run_files import begun, made, point, settle
+from tests.bench.app.gui.run_files import begun, close_files, made, point, settle
 from tests.patience import LONG_MS
 
 AGREES = {"alpha_2_predicted": 0.199, "alpha_2_predicted_uncertainty": 0.002, "agrees": True}
@@ -57,17 +59,32 @@ def one(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return made(tmp_path_factory.mktemp("one") / "run", point(16.0, 0.2))
 
 
-@pytest.fixture
-def page(qtbot: QtBot, folder: Path) -> ResultsPage:
+@pytest.fixture(scope="module")
+def one_page(qapp: QApplication, folder: Path) -> Generator[ResultsPage]:  # noqa: ARG001 - Qt needs its application
     controller = Controller()
     shown = ResultsPage(controller, LIGHT)
     shown.browser.folder = folder
-    qtbot.addWidget(shown)
     shown.resize(1200, 700)
     shown.show()
-    shown.destroyed.connect(controller.close)
-    _wait(shown.browser, qtbot, 4)
-    return shown
+    yield shown
+    controller.close()
+    shown.close()
+    shown.deleteLater()
+
+
+@pytest.fixture
+def page(one_page: ResultsPage, folder: Path, qtbot: QtBot) -> Generator[ResultsPage]:
+    """The page with the list of the folder, of which no file is open."""
+    browser = one_page.browser
+    _wait(browser, qtbot, 4)
+    yield one_page
+    close_files(one_page)
+    browser.search.clear()
+    browser.table.sortByColumn(run_browser.DATE, Qt.SortOrder.DescendingOrder)
+    browser.use_folder(folder)
+    one_page.browse()
+    # a problem is told until the folder was listed again
+    qtbot.waitUntil(lambda: not browser._problem, timeout=LONG_MS)
 
 
 def _wait(browser: RunBrowser, qtbot: QtBot, files: int) -> None:

@@ -1,5 +1,6 @@
 """What is drawn is what was measured: extremes of every pixel, points on their lines, questions inline."""
 
+from collections.abc import Generator
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,10 +16,11 @@ from pytestqt.qtbot import QtBot
 from bench.app.display import texts
 from bench.app.display.buffers import Ring
 from bench.app.display.theme import LIGHT
-from bench.app.gui.run_page import GAINS_HEIGHT
+from bench.app.gui.controller import Controller
+from bench.app.gui.run_page import GAINS_HEIGHT, RunPage
 from bench.app.gui.traces import AHEAD, LEAST
-from bench.app.gui.window import Window
-from bench.app.ipc.messages import TRACES, Beat, Ended, PlanChecked, Published, Question, Traces
+from bench.app.gui.window import SMALLEST, Window
+from bench.app.ipc.messages import TRACES, Beat, Ended, PlanChecked, Published, Traces
 from bench.datafile.tables import Column
 from bench.events import PointFinished, SpecimenMounted, State, StateChanged, Warned
 from bench.findings import FitFinished, FittedParameter, Series
@@ -35,6 +37,8 @@ from tests.bench.twin.twin_bench import estimate
 from tests.patience import LONG, LONG_MS
 
 STEP = 0.002
+EVENTS = 1500
+"""Of a flood."""
 
 
 def _block(begin: float, values: np.ndarray, step: float = STEP) -> Traces:
@@ -106,38 +110,61 @@ def test_a_gap_breaks_the_line() -> None:
     assert np.isnan(drawn).any()
 
 
+@pytest.fixture(scope="module")
+def page(qapp: QApplication) -> Generator[RunPage]:  # noqa: ARG001 - Qt needs its application
+    """One page for all runs: nothing of a run may remain in the next one."""
+    controller = Controller()
+    shown = RunPage(controller, LIGHT)
+    shown.resize(1200, 600)
+    shown.show()
+    yield shown
+    controller.close()
+    shown.close()
+    shown.deleteLater()
+
+
+PREDICTION = {
+    "omega": Column(np.array([15.0, 16.0, 17.0]), "rad/s", ""),
+    "beta": Column(np.full(3, 0.4), "1", ""),
+    "alpha_2": Column(np.array([0.3, 0.2, 0.4]), "1", ""),
+    "layer": Column(np.array(["rocking"] * 3), "", ""),
+}
+
+
 @pytest.fixture
-def link(window: Window, spoken: type[ScriptedClient]) -> ScriptedClient:
-    omega = np.array([15.0, 16.0, 17.0])
-    window.run.predict(
-        {
-            "omega": Column(omega, "rad/s", ""),
-            "beta": Column(np.full(3, 0.4), "1", ""),
-            "alpha_2": Column(np.array([0.3, 0.2, 0.4]), "1", ""),
-            "layer": Column(np.array(["rocking"] * 3), "", ""),
-        }
-    )
+def link(page: RunPage, spoken: type[ScriptedClient]) -> Generator[ScriptedClient]:
+    """The link of a run that has begun."""
+    page.predict(PREDICTION)
+    page._controller.start(order(Path("never")))
+    yield spoken.latest
+    page._controller._take(Ended("completed", "", {}, "", Path("never")))
+
+
+@pytest.fixture
+def driven(window: Window, spoken: type[ScriptedClient]) -> ScriptedClient:
+    """The link of a run that has begun in the window."""
+    window.run.predict(PREDICTION)
     window._controller.start(order(Path("never")))
     return spoken.latest
 
 
-def test_curves_hold_what_was_measured_in_the_unit_of_their_axis(window: Window, link: ScriptedClient) -> None:
+def test_curves_hold_what_was_measured_in_the_unit_of_their_axis(page: RunPage, link: ScriptedClient) -> None:
     values = np.zeros((50, len(TRACES)))
     values[25, TRACES.index("drift")] = 0.004
     values[30, TRACES.index("acceleration")] = -1.25
     link.said = [Traces(1, 0.0, STEP, values.astype(np.float32), values.astype(np.float32), 0.0)]
-    window._controller._look()
-    window.run.traces.draw()
-    curves = [curve.getData()[1] for curve in window.run.traces.curves]
+    page._controller._look()
+    page.traces.draw()
+    curves = [curve.getData()[1] for curve in page.traces.curves]
     assert curves[4].max() == pytest.approx(4.0)  # mm
     assert curves[1].min() == pytest.approx(-1.25)
-    low, high = window.run.traces.plots[4].viewRange()[1]
+    low, high = page.traces.plots[4].viewRange()[1]
     assert low <= -4.0
     assert high >= 4.0
 
 
 def test_the_axis_runs_on_between_blocks_and_stands_when_nothing_comes(
-    window: Window, link: ScriptedClient, monkeypatch: pytest.MonkeyPatch
+    page: RunPage, link: ScriptedClient, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Block of 0.1 s read at 50 s of the clock: the newest sample is as far from the right edge as it is old."""
     clock = 50.0
@@ -145,8 +172,8 @@ def test_the_axis_runs_on_between_blocks_and_stands_when_nothing_comes(
     still = np.zeros((50, len(TRACES)), np.float32)
     still[:, TRACES.index("u1")] = np.arange(50)
     link.said = [Traces(1, 3.0, STEP, still, still, 50.0), Beat(State.RUNNING, "", 3.1, 0, 0)]
-    window._controller._look()
-    traces = window.run.traces
+    page._controller._look()
+    traces = page.traces
     for clock, place in ((50.0, 0.0), (50.03, -0.03), (50.09, -0.09), (58.0, -AHEAD)):
         traces.draw()
         assert [curve.pos().x() for curve in traces.curves] == pytest.approx([place] * 5)
@@ -154,157 +181,87 @@ def test_the_axis_runs_on_between_blocks_and_stands_when_nothing_comes(
         moment = min(3.0 + clock - 50.0, 3.1)
         assert traces.moment == pytest.approx(moment)
         assert traces.ring.at(traces.moment)[TRACES.index("u1")] == pytest.approx((moment - 3.0) / STEP, abs=1.1)
-    window.run._refresh()
-    assert window.run.lost.text() == "newest sample 8.0 s old"
+    page._refresh()
+    assert page.lost.text() == "newest sample 8.0 s old"
     assert "not live for 8 s" in traces.plots[-1].getAxis("bottom").labelText
-    window.pages.setCurrentWidget(window.run)
-    window.run._draw()
-    assert "not live for 8 s" in window.run.picture.source.text()
+    page._draw()
+    assert "not live for 8 s" in page.picture.source.text()
     assert {curve.opts["pen"].color().name() for curve in traces.curves} == {LIGHT.faint}
     link.said = [Beat(State.WAITING, "a question", 3.1, 0, 0)]
-    window._controller._look()
-    assert "not live" in window.run.lost.text()
-    assert "0:08" in window.run.lost.text()
+    page._controller._look()
+    assert "not live" in page.lost.text()
+    assert "0:08" in page.lost.text()
     clock = 58.5
     link.said = [Traces(1, 11.0, STEP, still, still, 58.5)]
-    window._controller._look()
+    page._controller._look()
     traces.draw()
     assert traces.plots[-1].getAxis("bottom").labelText == texts.SECONDS
     assert LIGHT.faint not in {curve.opts["pen"].color().name() for curve in traces.curves}
 
 
-def test_a_block_is_drawn_as_soon_as_it_is_mounted(window: Window, link: ScriptedClient) -> None:
+def test_a_block_is_drawn_as_soon_as_it_is_mounted(page: RunPage, link: ScriptedClient) -> None:
     """And traces are labelled for what laser 2 measures."""
-    specimen, titles = Specimen(), lambda: " ".join(plot.titleLabel.text for plot in window.run.traces.plots)
+    specimen, titles = Specimen(), lambda: " ".join(plot.titleLabel.text for plot in page.traces.plots)
     link.said = [Published(SpecimenMounted(specimen.coupled(0.4), OperatorTask.MOUNT_SPRING, time=1.0))]
-    window._controller._look()
-    assert window.run.picture.canvas.arrangement.spring
+    page._controller._look()
+    assert page.picture.canvas.arrangement.spring
     assert "storey 2, u2" in titles()
     link.said = [Published(SpecimenMounted(specimen, OperatorTask.WATCH_BLOCK, 0.3, time=2.0))]
-    window._controller._look()
-    shown = window.run.picture.canvas.arrangement
+    page._controller._look()
+    shown = page.picture.canvas.arrangement
     assert (shown.block, shown.spring, shown.face) == (True, False, 0.3)
     assert "laser 2, block 300 mm above the table" in titles()
     assert "storey 2" not in titles()
 
 
-def test_a_flood_of_events_leaves_the_main_loop_free(
-    window: Window, link: ScriptedClient, monkeypatch: pytest.MonkeyPatch, qtbot: QtBot
-) -> None:
-    """5000 events of 1 ms each: no turn handles more than its budget, none is lost, no hidden form validates itself."""
-    second, turns, handled, checks = now(), list[int](), list[str](), 0
-    monkeypatch.setattr("bench.app.gui.controller.BUDGET", 0.02)
-    monkeypatch.setattr("bench.app.gui.controller.now", lambda: second)
-
-    def take(event: Warned) -> None:
-        nonlocal second
-        second += 0.001
-        handled.append(event.text)
-
-    def count(*_given: object) -> tuple[()]:
-        nonlocal checks
-        checks += 1
-        return ()
-
-    monkeypatch.setattr("bench.app.gui.form.problems", count)
-    window._controller.event_received.connect(take)
-    window._controller.changed.connect(lambda: turns.append(len(handled)))
-    link.said = [Published(Warned(f"{number}", time=1.0)) for number in range(5000)]
-    qtbot.waitUntil(lambda: len(handled) == 5000, timeout=LONG_MS)
-    assert handled == [f"{number}" for number in range(5000)]
-    assert max(np.diff([0, *turns])) <= 21
-    assert len(turns) <= 2 * 5000 / 20
-    assert checks == 0
-    assert link.beats >= 5
-
-
-@pytest.mark.milliseconds
-@pytest.mark.seconds
-def test_stop_acts_during_a_flood_of_events(
-    window: Window, link: ScriptedClient, monkeypatch: pytest.MonkeyPatch, qtbot: QtBot
-) -> None:
-    """5000 events per second for two seconds, by the clock: the longest gap of the main loop, and STOP meanwhile."""
-    monkeypatch.setattr("bench.app.gui.controller.BUDGET", 0.02)
-    window.pages.setCurrentWidget(window.run)
-    qtbot.wait(200)
-    begin, turns, sent = now(), list[float](), 0
-    pressed = stopped = 0.0
-
-    def feed() -> None:
-        nonlocal sent
-        due = min(round(5000 * (now() - begin)), 10_000)
-        link.said += [
-            Published(
-                Warned(f"{k}", time=1.0) if k % 2 else Estimate(16.0, 0.4, k, 0.01, 0.24, 0.004, 0.2, time=k / 5000)
-            )
-            for k in range(sent, due)
-        ]
-        sent = due
-
-    while sent < 10_000 or window._controller._waiting or link.said:
-        feed()
-        if sent >= 5000 and not pressed:
-            pressed = now()
-            QTimer.singleShot(0, lambda: QTest.mousePress(window.header.stop, Qt.MouseButton.LeftButton))
-        QApplication.processEvents()
-        turns.append(now())
-        if link.asked and not stopped:
-            stopped = now()
-        assert now() - begin < LONG
-    assert link.asked == ["abort"]
-    assert stopped - pressed <= 0.15
-    assert max(np.diff(turns)) <= 0.1
-
-
-def test_the_running_gain_and_the_finished_point(window: Window, link: ScriptedClient) -> None:
+def test_the_running_gain_and_the_finished_point(page: RunPage, link: ScriptedClient) -> None:
     point = HarmonicPoint(
         omega_rad_s=16.0, beta=0.4, status=PointStatus.STEADY, layer="rocking", alpha_2=0.21, alpha_2_uncertainty=0.01
     )
     link.said = [Published(Estimate(16.0, 0.4, 12, 0.01, 0.24, 0.0041, 0.2, time=1.0))]
-    window._controller._look()
-    assert "0.2400 ± 0.0041" in window.run.verdict.sentence
-    assert "+20.0 %" in window.run.verdict.sentence
+    page._controller._look()
+    assert "0.2400 ± 0.0041" in page.verdict.sentence
+    assert "+20.0 %" in page.verdict.sentence
     link.said = [Published(PointFinished(point, time=2.0)), Published(Warned("drift comes near", time=3.0))]
-    window._controller._look()
-    assert window.run.gains.measured == [(16.0, 0.21)]
-    assert window.run.picture.canvas.arrangement.spring
-    assert "▲ warning: drift comes near" in window.run.log.toPlainText()
+    page._controller._look()
+    assert page.gains.measured == [(16.0, 0.21)]
+    assert page.picture.canvas.arrangement.spring
+    assert "▲ warning: drift comes near" in page.log.toPlainText()
 
 
 def test_the_large_gain_names_its_point_and_its_uncertainty_is_that_of_the_file(
-    window: Window, link: ScriptedClient
+    page: RunPage, link: ScriptedClient
 ) -> None:
-    run = window.run
+    run = page
     link.said = [Published(Estimate(16.0, 0.4, 12, 0.01, 0.24, 0.0041, 0.2, time=1.0))]
-    window._controller._look()
+    page._controller._look()
     assert "ω = 16 rad/s, β = 0.4" in run.point.text()
     assert "measuring" in run.point.text()
     point = HarmonicPoint(
         omega_rad_s=16.0, beta=0.4, status=PointStatus.STEADY, layer="rocking", alpha_2=0.239, alpha_2_uncertainty=0.011
     )
     link.said = [Published(PointFinished(point, time=2.0))]
-    window._controller._look()
+    page._controller._look()
     assert "last point, steady: ω = 16 rad/s, β = 0.4" in run.point.text()
     assert run.verdict.sentence.startswith("α₂ 0.239 ± 0.011 · ")
     nan = float("nan")
     link.said = [Published(Estimate(17.0, None, 1, 0.01, nan, nan, nan, time=3.0))]
-    window._controller._look()
+    page._controller._look()
     assert "ω = 17 rad/s, bare frame" in run.point.text()
     assert "0.239" not in run.verdict.sentence
     fallen = point.model_copy(update={"alpha_2": None, "status": PointStatus.OVERTURNED})
     link.said = [Published(PointFinished(fallen, time=4.0))]
-    window._controller._look()
+    page._controller._look()
     assert "overturned" in run.verdict.sentence
 
 
 def test_a_protocol_without_a_gain_shows_its_fits_instead_of_an_empty_gain_plot(
-    window: Window, link: ScriptedClient
+    page: RunPage, link: ScriptedClient
 ) -> None:
-    run = window.run
+    run = page
     link.said = [Ended("completed", "the plan was carried out", {}, "", Path("never"))]
-    window._controller._look()
-    window._controller.start(replace(order(Path("never")), protocol="free-vibration"))
-    window.pages.setCurrentWidget(run)
+    page._controller._look()
+    page._controller.start(replace(order(Path("never")), protocol="free-vibration"))
     assert run.gains.isHidden()
     assert [plot.figure.curves for plot in run.live.shown] == [(), ()]
     assert "gain" not in run.verdict.sentence
@@ -318,7 +275,7 @@ def test_a_protocol_without_a_gain_shows_its_fits_instead_of_an_empty_gain_plot(
     }
     fit = FitFinished("pluck 1", "k1 = 1 +- 0.1", columns, {"k1": FittedParameter(1234.5, 1.5, "N/m")})
     ScriptedClient.latest.said = [Published(fit)]
-    window._controller._look()
+    page._controller._look()
     run._draw()
     decay, _ = run.live.shown
     assert [curve.name for curve in decay.figure.curves] == ["laser 1", "laser 1 fitted"]
@@ -326,33 +283,159 @@ def test_a_protocol_without_a_gain_shows_its_fits_instead_of_an_empty_gain_plot(
     assert curve.getData()[1].max() == pytest.approx(1.0), "in mm"
     assert "(1234.5 ± 3.0) N/m" in run.verdict.sentence
     assert "±" in run.point.text()
-    window._controller._take(Ended("completed", "", {}, "", Path("never")))
-    window._controller.start(replace(order(Path("never")), protocol="harmonic", parameters=HarmonicParameters()))
+    page._controller._take(Ended("completed", "", {}, "", Path("never")))
+    page._controller.start(replace(order(Path("never")), protocol="harmonic", parameters=HarmonicParameters()))
     assert not run.gains.isHidden()
     assert run.live.shown == []
 
 
-def test_combinations_that_were_left_out_are_in_the_log_with_the_reason(window: Window, link: ScriptedClient) -> None:
+def test_combinations_that_were_left_out_are_in_the_log_with_the_reason(page: RunPage, link: ScriptedClient) -> None:
     why = "Kobe, beta = 0.97 is left out, since it would exceed a limit: limits.drift"
     left_out = EarthquakePoint(
         record="Kobe", beta=0.97, status=PointOutcome.NOT_PLAYED, pga_target_m_s2=2.0, reason="limits.drift exceeded"
     )
     link.said = [Published(Warned(why, time=0.0)), Published(PointFinished(left_out, time=1.0))]
-    window._controller._look()
-    log = window.run.log.toPlainText()
+    page._controller._look()
+    log = page.log.toPlainText()
     assert "β = 0.97 is left out" in log
     assert "Kobe, β 0.97: not played" in log
     assert log.count("limits.drift") == 2
-    assert "no gain: not played" in window.run.verdict.sentence
-    assert "Kobe, β = 0.97" in window.run.point.text()
+    assert "no gain: not played" in page.verdict.sentence
+    assert "Kobe, β = 0.97" in page.point.text()
+
+
+def test_an_axis_that_is_twice_too_wide_is_narrowed(page: RunPage, link: ScriptedClient) -> None:
+    traces = page.traces
+    for largest, reach in ((0.010, 11.5), (0.006, 11.5), (0.005, 5.75), (0.020, 23.0)):
+        traces.clear()
+        values = np.zeros((50, len(TRACES)), np.float32)
+        values[0, TRACES.index("u1")] = largest
+        link.said = [Traces(1, 0.0, STEP, values, values, 0.0)]
+        before = 11.5 if largest < 0.010 else LEAST
+        traces._reach[2] = before
+        page._controller._look()
+        traces.draw()
+        assert traces._reach[2] == pytest.approx(reach, rel=1e-5)
+    size = page.size()
+    page.resize(*SMALLEST)
+    assert page.gains.height() >= GAINS_HEIGHT
+    page.resize(size)
+
+
+def test_the_model_beside_the_test_is_told_while_the_bench_is_driven(page: RunPage, link: ScriptedClient) -> None:
+    assert page.twin.text().endswith(": -")
+    link.said = [Published(estimate(drift_peak=0.01819, drift_peak_measured=0.01822, residual=0.003))]
+    page._controller._look()
+    assert "drift peak 18.22 mm, model 18.19 mm; residual 0.3 %" in page.twin.text()
+    link.said = [Published(StateChanged(State.STOPPING, State.IDLE, "the output is at zero", time=1.0))]
+    page._controller._look()
+    page._refresh()
+    assert page.twin.text().endswith(": -")
+    link.said = [
+        Published(estimate(drift_peak=0.01819, drift_peak_measured=0.01822, residual=0.003)),
+        Ended("aborted", "abort requested", {}, "", Path("never")),
+    ]
+    page._controller._look()
+    page._refresh()
+    assert page.twin.text().endswith(": -"), "a run that is over has no live model"
+
+
+def test_ramping_out_is_a_request_of_its_own(page: RunPage, link: ScriptedClient, qtbot: QtBot) -> None:
+    link.said = [Beat(State.RUNNING, "", 1.0, 0, 0)]
+    page._controller._look()
+    qtbot.mouseClick(page.ramp_out, Qt.MouseButton.LeftButton)
+    assert link.asked == ["stop"]
+    assert not page._controller.latched
+
+
+def test_a_live_value_is_shown_with_its_unit_and_prediction(page: RunPage, link: ScriptedClient) -> None:
+    link.said = [Published(LiveValue("period", 0.6412, "s", 0.0031, 0.6389, time=3.0))]
+    page._controller._look()
+    assert page.verdict.sentence == "period  (0.6412 ± 0.0031) s · predicted 0.6389 · +0.4 %"
+    link.said = [Published(LiveValue("cycles", 12.0, "1", time=4.0))]
+    page._controller._look()
+    assert page.verdict.sentence == "cycles  12.00"
+
+
+def test_a_flood_of_events_leaves_the_main_loop_free(
+    window: Window, driven: ScriptedClient, monkeypatch: pytest.MonkeyPatch, qtbot: QtBot
+) -> None:
+    """1500 events of 1 ms each: no turn handles more than its budget, none is lost, no hidden form validates itself."""
+    second, turns, handled, checks = now(), list[int](), list[str](), 0
+    monkeypatch.setattr("bench.app.gui.controller.BUDGET", 0.02)
+    monkeypatch.setattr("bench.app.gui.controller.now", lambda: second)
+
+    def take(event: Warned) -> None:
+        nonlocal second
+        second += 0.001
+        handled.append(event.text)
+
+    def turn() -> None:
+        turns.append(len(handled))
+
+    def count(*_given: object) -> tuple[()]:
+        nonlocal checks
+        checks += 1
+        return ()
+
+    monkeypatch.setattr("bench.app.gui.form.problems", count)
+    window._controller.event_received.connect(take)
+    window._controller.changed.connect(turn)
+    driven.said = [Published(Warned(f"{number}", time=1.0)) for number in range(EVENTS)]
+    qtbot.waitUntil(lambda: len(handled) == EVENTS, timeout=LONG_MS)
+    window._controller.event_received.disconnect(take)
+    window._controller.changed.disconnect(turn)
+    assert handled == [f"{number}" for number in range(EVENTS)]
+    assert max(np.diff([0, *turns])) <= 21
+    assert len(turns) <= 2 * EVENTS / 20
+    assert checks == 0
+    assert driven.beats >= 5
+
+
+@pytest.mark.milliseconds
+@pytest.mark.seconds
+def test_stop_acts_during_a_flood_of_events(
+    window: Window, driven: ScriptedClient, monkeypatch: pytest.MonkeyPatch, qtbot: QtBot
+) -> None:
+    """5000 events per second for a second, by the clock: the longest gap of the main loop, and STOP meanwhile."""
+    monkeypatch.setattr("bench.app.gui.controller.BUDGET", 0.02)
+    window.pages.setCurrentWidget(window.run)
+    qtbot.wait(200)
+    begin, turns, sent = now(), list[float](), 0
+    pressed = stopped = 0.0
+
+    def feed() -> None:
+        nonlocal sent
+        due = min(round(5000 * (now() - begin)), 5000)
+        driven.said += [
+            Published(
+                Warned(f"{k}", time=1.0) if k % 2 else Estimate(16.0, 0.4, k, 0.01, 0.24, 0.004, 0.2, time=k / 5000)
+            )
+            for k in range(sent, due)
+        ]
+        sent = due
+
+    while sent < 5000 or window._controller._waiting or driven.said:
+        feed()
+        if sent >= 2500 and not pressed:
+            pressed = now()
+            QTimer.singleShot(0, lambda: QTest.mousePress(window.header.stop, Qt.MouseButton.LeftButton))
+        QApplication.processEvents()
+        turns.append(now())
+        if driven.asked and not stopped:
+            stopped = now()
+        assert now() - begin < LONG
+    assert driven.asked == ["abort"]
+    assert stopped - pressed <= 0.15
+    assert max(np.diff(turns)) <= 0.1
 
 
 def test_points_stay_until_something_else_begins(
-    window: Window, link: ScriptedClient, spoken: type[ScriptedClient]
+    window: Window, driven: ScriptedClient, spoken: type[ScriptedClient]
 ) -> None:
     """A plan that is checked leaves them; a loop check, which has no gains, begins with an empty plot."""
     point = HarmonicPoint(omega_rad_s=16.0, beta=0.4, status=PointStatus.STEADY, layer="rocking", alpha_2=0.21)
-    link.said = [
+    driven.said = [
         Published(PointFinished(point, time=2.0)),
         Ended("completed", "the plan was carried out", {}, "", Path("never")),
     ]
@@ -365,85 +448,3 @@ def test_points_stay_until_something_else_begins(
     window.setup.loop.start()
     assert window._controller.running
     assert window.run.gains.measured == []
-
-
-def test_an_axis_that_is_twice_too_wide_is_narrowed(window: Window, link: ScriptedClient) -> None:
-    traces = window.run.traces
-    for largest, reach in ((0.010, 11.5), (0.006, 11.5), (0.005, 5.75), (0.020, 23.0)):
-        traces.clear()
-        values = np.zeros((50, len(TRACES)), np.float32)
-        values[0, TRACES.index("u1")] = largest
-        link.said = [Traces(1, 0.0, STEP, values, values, 0.0)]
-        before = 11.5 if largest < 0.010 else LEAST
-        traces._reach[2] = before
-        window._controller._look()
-        traces.draw()
-        assert traces._reach[2] == pytest.approx(reach, rel=1e-5)
-    window.resize(window.minimumSize())
-    window.pages.setCurrentWidget(window.run)
-    assert window.run.gains.height() >= GAINS_HEIGHT
-
-
-def test_the_model_beside_the_test_is_told_while_the_bench_is_driven(window: Window, link: ScriptedClient) -> None:
-    assert window.run.twin.text().endswith(": -")
-    link.said = [Published(estimate(drift_peak=0.01819, drift_peak_measured=0.01822, residual=0.003))]
-    window._controller._look()
-    assert "drift peak 18.22 mm, model 18.19 mm; residual 0.3 %" in window.run.twin.text()
-    link.said = [Published(StateChanged(State.STOPPING, State.IDLE, "the output is at zero", time=1.0))]
-    window._controller._look()
-    window.run._refresh()
-    assert window.run.twin.text().endswith(": -")
-    link.said = [
-        Published(estimate(drift_peak=0.01819, drift_peak_measured=0.01822, residual=0.003)),
-        Ended("aborted", "abort requested", {}, "", Path("never")),
-    ]
-    window._controller._look()
-    window.run._refresh()
-    assert window.run.twin.text().endswith(": -"), "a run that is over has no live model"
-
-
-def test_a_question_is_inline_and_answered_once(window: Window, link: ScriptedClient, qtbot: QtBot) -> None:
-    link.said = [
-        Published(StateChanged(State.IDLE, State.WAITING, "a question", time=1.0)),
-        Question(7, "Mount the spring of beta = 0.4."),
-    ]
-    window._controller._look()
-    assert window.prompt.isVisible()
-    assert window.prompt.request.text() == "Mount the spring of β = 0.4."
-    assert QApplication.activeModalWidget() is None
-    qtbot.waitUntil(window.prompt.done.isEnabled, timeout=LONG_MS)
-    qtbot.mouseClick(window.prompt.done, Qt.MouseButton.LeftButton)
-    qtbot.mouseClick(window.prompt.done, Qt.MouseButton.LeftButton)
-    assert link.asked == [(7, True)]
-    assert not window.prompt.isVisible()
-
-
-def test_a_question_goes_when_the_bench_no_longer_waits(window: Window, link: ScriptedClient) -> None:
-    link.said = [Question(1, "Stand the block up.")]
-    window._controller._look()
-    link.said = [Published(StateChanged(State.WAITING, State.HALTED, "halt requested", time=1.0))]
-    window._controller._look()
-    assert not window.prompt.isVisible()
-
-
-def test_ramping_out_is_a_request_of_its_own(window: Window, link: ScriptedClient, qtbot: QtBot) -> None:
-    link.said = [Beat(State.RUNNING, "", 1.0, 0, 0)]
-    window._controller._look()
-    qtbot.mouseClick(window.run.ramp_out, Qt.MouseButton.LeftButton)
-    assert link.asked == ["stop"]
-    assert not window._controller.latched
-
-
-def test_no_dialog_can_be_opened_while_armed(window: Window, link: ScriptedClient) -> None:
-    link.said = [Beat(State.RUNNING, "", 1.0, 0, 0)]
-    window._controller._look()
-    assert not window.results.open_file.isEnabled()
-
-
-def test_a_live_value_is_shown_with_its_unit_and_prediction(window: Window, link: ScriptedClient) -> None:
-    link.said = [Published(LiveValue("period", 0.6412, "s", 0.0031, 0.6389, time=3.0))]
-    window._controller._look()
-    assert window.run.verdict.sentence == "period  (0.6412 ± 0.0031) s · predicted 0.6389 · +0.4 %"
-    link.said = [Published(LiveValue("cycles", 12.0, "1", time=4.0))]
-    window._controller._look()
-    assert window.run.verdict.sentence == "cycles  12.00"

@@ -13,7 +13,7 @@ from bench.app.gui.sound import ABORT, END, INTERVAL, QUESTION, Sounds
 from bench.app.gui.window import Window
 from bench.app.ipc.messages import Ended, Question, Refused
 from bench.events import State, StateChanged
-from tests.bench.app.gui.conftest import PROTOCOLS
+from tests.bench.app.gui.shared_window import PROTOCOLS, undressed
 from tests.bench.app.ipc.experiment import bench, order
 from tests.patience import LONG_MS
 
@@ -86,7 +86,8 @@ def test_the_switch_is_kept(qtbot: QtBot, tmp_path: Path, beeps: list[None]) -> 
     settings = QSettings(str(tmp_path / "kept.ini"), QSettings.Format.IniFormat)
 
     def opened() -> Window:
-        window = Window(Controller(), bench(), PROTOCOLS, LIGHT, settings=settings)
+        with undressed():
+            window = Window(Controller(), bench(), PROTOCOLS, LIGHT, settings=settings)
         qtbot.addWidget(window)
         window.show()
         window.pages.setCurrentWidget(window.setup)

@@ -53,13 +53,6 @@ def test_the_button_aborts_and_the_next_press_halts(window: Window, link: Script
     assert stop.geometry() == place
 
 
-@pytest.mark.parametrize("page", range(len(texts.PAGES)))
-def test_the_key_works_on_every_page(page: int, window: Window, link: ScriptedClient, qtbot: QtBot) -> None:
-    window.pages.setCurrentIndex(page)
-    qtbot.keyClick(QApplication.focusWidget() or window, KEY)
-    assert link.asked == ["abort"]
-
-
 @NO_PLOTS
 def test_the_key_works_behind_a_modal_dialog(window: Window, link: ScriptedClient, qtbot: QtBot) -> None:
     dialog = QDialog(window)
@@ -159,6 +152,20 @@ def test_the_bar_says_when_the_key_needs_the_focus(
     assert "F12 works only while this window has the focus" in header.reason.text()
 
 
+@NO_PLOTS
+def test_stop_without_a_run_latches_too(window: Window, qtbot: QtBot) -> None:
+    qtbot.keyClick(window, KEY)
+    assert window._controller.latched
+    assert window.protocol.why_not == texts.LATCHED
+
+
+@pytest.mark.parametrize("page", range(len(texts.PAGES)))
+def test_the_key_works_on_every_page(page: int, window: Window, link: ScriptedClient, qtbot: QtBot) -> None:
+    window.pages.setCurrentIndex(page)
+    qtbot.keyClick(QApplication.focusWidget() or window, KEY)
+    assert link.asked == ["abort"]
+
+
 def test_no_other_key_stops_or_starts(window: Window, link: ScriptedClient, qtbot: QtBot) -> None:
     for key in (Qt.Key.Key_Space, Qt.Key.Key_Return, Qt.Key.Key_Escape):
         for page in range(len(texts.PAGES)):
@@ -167,10 +174,3 @@ def test_no_other_key_stops_or_starts(window: Window, link: ScriptedClient, qtbo
         assert link.asked == [], key
     assert window.header.stop.focusPolicy() == Qt.FocusPolicy.NoFocus
     assert window.protocol.start.focusPolicy() == Qt.FocusPolicy.NoFocus
-
-
-@NO_PLOTS
-def test_stop_without_a_run_latches_too(window: Window, qtbot: QtBot) -> None:
-    qtbot.keyClick(window, KEY)
-    assert window._controller.latched
-    assert window.protocol.why_not == texts.LATCHED

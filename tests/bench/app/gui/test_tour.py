@@ -16,8 +16,8 @@ from bench.app.ipc.messages import Ended, PlanChecked, Question, Refused
 from bench.config.model import BenchConfiguration
 from bench.events import PointFinished, Warned
 from sim.parameters import Parameters
-from tests.bench.app.gui.conftest import PROTOCOLS, SHAKING
-from tests.bench.app.ipc.experiment import bench, order
+from tests.bench.app.gui.shared_window import PROTOCOLS, undressed
+from tests.bench.app.ipc.experiment import SHAKING, bench, order
 
 FINE = PlanChecked((), None, (), 60.0, 1e6, 1e9, "hash", {})
 COMPLETED = Ended("completed", "the plan was carried out", {}, "", Path("never"))
@@ -73,7 +73,8 @@ def test_a_run_without_a_point_is_begun_again(controller: Controller, ended: End
 @pytest.mark.usefixtures("without_live_plots", "spoken")
 def test_each_step_frames_its_part_and_waits_for_it(qtbot: QtBot) -> None:
     controller = Controller()
-    window = Window(controller, bench(), (SHAKING, *PROTOCOLS), LIGHT, tour=True)
+    with undressed():
+        window = Window(controller, bench(), (SHAKING, *PROTOCOLS), LIGHT, tour=True)
     qtbot.addWidget(window)
     window.show()
     tour, tabs = window.welcome, window.results.parts
@@ -111,7 +112,8 @@ def test_each_step_frames_its_part_and_waits_for_it(qtbot: QtBot) -> None:
 @pytest.mark.usefixtures("without_live_plots", "spoken")
 def test_the_tour_gives_way_to_what_matters_and_to_a_real_bench(qtbot: QtBot) -> None:
     controller = Controller()
-    window = Window(controller, bench(), (SHAKING, *PROTOCOLS), LIGHT, tour=True)
+    with undressed():
+        window = Window(controller, bench(), (SHAKING, *PROTOCOLS), LIGHT, tour=True)
     qtbot.addWidget(window)
     window.show()
     assert window.welcome.isVisible()

@@ -1,5 +1,6 @@
 """Results of an opened run become values of the next one, and the configuration can be used again."""
 
+import shutil
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -10,10 +11,11 @@ from bench.analysis.laser_calibration import LaserCalibration, LaserCurve
 from bench.app.gui.window import Window
 from bench.config.result_files import write_calibration, write_specimen
 from bench.control.table_model import TableModel
+from bench.results import FILE
 from sim.identified import Finding, Identified
 from tests.bench.app.gui.conftest import ScriptedClient
 from tests.bench.app.gui.run_files import made, point, settle
-from tests.bench.app.ipc.experiment import order
+from tests.bench.app.ipc.experiment import bench, order
 
 pytestmark = pytest.mark.usefixtures("without_live_plots", "spoken")
 
@@ -31,18 +33,24 @@ def _table_model(sample_rate: float, date: datetime = NOW) -> TableModel:
     return TableModel(date=date, specimen="bare frame", sample_rate=sample_rate, level=0.1, frequency=lines, **values)
 
 
-@pytest.fixture
-def run(tmp_path: Path, window: Window) -> Path:
-    """A run whose folder has a result of every kind."""
-    path = made(tmp_path / "identified", point(16.0, 0.2))
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder of a run with a result of every kind."""
+    path = made(tmp_path_factory.mktemp("results") / "identified", point(16.0, 0.2))
     found = Finding(name="k1", value=201.5, standard_uncertainty=1.5, source="free vibration", date=NOW)
     write_specimen(path.with_name("specimen.json"), Identified(findings=(found,)))
     calibration = LaserCalibration(
         date=NOW, valid_days=365.0, laser_1=CURVE, laser_2=CURVE, **_further_fields(LaserCalibration)
     )
     write_calibration(path.with_name("laser_calibration.json"), calibration)
-    _table_model(window.setup.configuration.sample_rate).write(path.with_name("table_model.json"))
-    return path
+    _table_model(bench().sample_rate).write(path.with_name("table_model.json"))
+    return path.parent
+
+
+@pytest.fixture
+def run(results: Path, tmp_path: Path) -> Path:
+    """The file of such a run, of the test's own."""
+    return Path(shutil.copytree(results, tmp_path / "identified"), FILE)
 
 
 def _further_fields(model: type[LaserCalibration]) -> dict[str, float]:
@@ -114,7 +122,8 @@ def test_nothing_is_changed_during_a_run(window: Window, run: Path) -> None:
     assert reuse.use_it.toolTip() == "a run is under way"
 
 
-def test_a_run_without_results_offers_none(window: Window, tmp_path: Path) -> None:
-    window.results._open_run(made(tmp_path / "plain", point(16.0, 0.2)))
+def test_a_run_without_results_offers_none(window: Window, results: Path, tmp_path: Path) -> None:
+    window.results._open_run(Path(shutil.copy(results / FILE, tmp_path)))
     settle(window.results)
+    assert window.results.files.count() == 1
     assert window.results.reuse.isHidden()

@@ -13,7 +13,6 @@ from bench.app.display import texts
 from bench.app.display.theme import LIGHT
 from bench.app.gui.controller import Controller
 from bench.app.gui.help_panel import reference_text
-from bench.app.gui.palette import dress
 from bench.app.gui.panels import TASKS, UNKNOWN_TASK
 from bench.app.gui.window import Window
 from bench.app.ipc.messages import PlanChecked, Run
@@ -28,8 +27,8 @@ from bench.datafile.reader import DataFile, open_datafile
 from bench.events import PointFinished
 from bench.protocol import Protocol
 from bench.replay.session import stored_configuration
-from tests.bench.app.gui.conftest import PROTOCOLS
 from tests.bench.app.gui.run_files import show
+from tests.bench.app.gui.shared_window import PROTOCOLS, undressed
 from tests.bench.app.gui.visible_text import painted_texts, widget_texts
 from tests.first_edition.command import DATA, unpack
 from tests.test_visible_text import RUNS
@@ -42,11 +41,11 @@ QUICK = {"check", "free_vibration", "coupling_stiffness", "laser_calibration", "
 
 
 @pytest.fixture(scope="module")
-def shown(qapp: QApplication) -> Iterator[Window]:
+def shown(qapp: QApplication) -> Iterator[Window]:  # noqa: ARG001 - Qt needs its application
     """One window for all tests, which it takes a second to build."""
-    dress(qapp, LIGHT)
     controller = Controller()
-    window = Window(controller, BenchConfiguration(), PROTOCOLS, LIGHT, tour=True)
+    with undressed():
+        window = Window(controller, BenchConfiguration(), PROTOCOLS, LIGHT, tour=True)
     window.resize(1280, 720)
     window.show()
     yield window

@@ -28,7 +28,7 @@ def until(condition: Callable[[], object], what: str) -> None:
     end = time.monotonic() + LONG
     while not condition():
         assert time.monotonic() < end, what
-        time.sleep(0.1)
+        time.sleep(0.3)
 
 
 @dataclass(frozen=True)
