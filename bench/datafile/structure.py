@@ -142,9 +142,8 @@ def check_attributes(owner: Any, path: str) -> None:
     if (count := h5py.h5a.get_num_attrs(owner.id)) > MOST_ATTRIBUTES:
         raise DataFileError(f"{path} has {count} attributes; at most {MOST_ATTRIBUTES} are allowed")
     for number in range(count):
-        stored = h5py.h5a.open(owner.id, index=number)
-        if (size := stored.get_storage_size()) > LARGEST_ATTRIBUTE:
-            name = stored.name.decode(errors="replace")
+        if (size := h5py.h5a.get_info(owner.id, index=number).data_size) > LARGEST_ATTRIBUTE:
+            name = h5py.h5a.open(owner.id, index=number).name.decode(errors="replace")
             raise DataFileError(
                 f"the attribute {name} of {path} has {size} bytes; at most {LARGEST_ATTRIBUTE} are allowed"
             )
