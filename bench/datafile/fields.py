@@ -76,7 +76,7 @@ class Field:
                 compress=self.packed,
             )
         hdf5.describe(made, kind=self.kind.value)
-        made.attrs["optional"] = np.int8(self.optional)
+        hdf5.describe_switch(made, "optional", value=self.optional)
         return made
 
     def encode(self, value: Any) -> Any:

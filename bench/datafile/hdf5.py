@@ -17,6 +17,7 @@ from numpy.typing import DTypeLike, NDArray
 from bench.datafile.access import VERSIONS, Quiet, is_let_go, locking, open_living, open_to_write
 from bench.datafile.hdf5_objects import attributes as attributes
 from bench.datafile.hdf5_objects import describe as describe
+from bench.datafile.hdf5_objects import describe_switch as describe_switch
 from bench.datafile.hdf5_reading import Dataset as Dataset
 from bench.datafile.hdf5_reading import File as File
 from bench.datafile.hdf5_reading import Group as Group

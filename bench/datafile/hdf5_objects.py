@@ -18,7 +18,8 @@ import h5py.h5t
 import numpy as np
 
 _TEXT = h5py.string_dtype()
-_TEXT_STORED, _SCALAR = h5py.h5t.py_create(_TEXT, logical=True), h5py.h5s.create(h5py.h5s.SCALAR)
+_TEXT_STORED, _TEXT_READ = h5py.h5t.py_create(_TEXT, logical=True), h5py.h5t.py_create(_TEXT)
+_SWITCH, _SCALAR = h5py.h5t.py_create(np.dtype(np.int8)), h5py.h5s.create(h5py.h5s.SCALAR)
 
 
 def is_hard_link(parent: Any, name: str) -> bool:
@@ -44,11 +45,15 @@ def attributes(owner: Any) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for number in range(h5py.h5a.get_num_attrs(owner.id)):
         stored: Any = h5py.h5a.open(owner.id, index=number)
-        name, kind = stored.name.decode("utf-8", "surrogateescape"), stored.dtype
-        if stored.shape == () and (text := h5py.check_string_dtype(kind)) is not None and text.length is None:
-            value: Any = np.empty((), kind)
-            stored.read(value)
+        name, type_, shape = stored.name.decode("utf-8", "surrogateescape"), stored.get_type(), stored.shape
+        if shape == () and type_.equal(_TEXT_STORED):
+            value: Any = np.empty((), _TEXT)
+            stored.read(value, mtype=_TEXT_READ)
             found[name] = value[()].decode("utf-8", "surrogateescape")
+        elif shape is not None and (kind := type_.dtype).kind in "iuf" and kind.metadata is None:
+            value = np.empty(shape, kind)
+            stored.read(value)
+            found[name] = value[()]
         else:
             found[name] = owner.attrs[name]
     return found
@@ -58,6 +63,11 @@ def describe(owner: Any, **texts: str) -> None:
     """Add string attributes to a new object, as `owner.attrs` would."""
     for name, text in texts.items():
         h5py.h5a.create(owner.id, name.encode(), _TEXT_STORED, _SCALAR).write(np.array(text, dtype=_TEXT))
+
+
+def describe_switch(owner: Any, name: str, *, value: bool) -> None:
+    """Add a switch (0 or 1, int8) to a new object, as `owner.attrs` would."""
+    h5py.h5a.create(owner.id, name.encode(), _SWITCH, _SCALAR).write(np.array(value, dtype=np.int8))
 
 
 def _encoded(name: str) -> bytes:

@@ -149,8 +149,11 @@ def groups(parent: Group) -> Iterator[Group]:
     """A group and every group below it, in the order of creation."""
     yield parent
     for name, member in members(parent):
-        if not isinstance(member, str | h5py.Dataset):
-            yield from groups(group(parent, name))
+        if isinstance(member, h5py.Group):
+            yield from groups(cast(Group, member))
+        elif not isinstance(member, str | h5py.Dataset):
+            # raises the error that names it
+            group(parent, name)
 
 
 def names(parent: Group) -> list[str]:

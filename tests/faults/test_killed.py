@@ -4,27 +4,36 @@ import os
 import signal
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from bench.datafile.reader import open_datafile
-from tests.faults.places import PLACES
+from bench.events import State
+from tests.faults.places import PLACES, Place
 from tests.faults.setup import BLOCK
 from tests.patience import LONG
 
 ROOT = Path(__file__).parents[2]
+STATES = [*{place.state: place for place in PLACES if place.core}.values()]
+"""The last place in each state."""
 
 
 @pytest.mark.skipif(os.name != "posix", reason="kills processes the POSIX way")
-def test_killed_in_every_state(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "tests.faults.killed", str(tmp_path)]
+@pytest.mark.parametrize(
+    "places",
+    [pytest.param(STATES, id="a place each"), pytest.param(PLACES, id="every place", marks=pytest.mark.soak)],
+)
+def test_killed_in_every_state(places: Sequence[Place], tmp_path: Path) -> None:
+    assert {place.state for place in places} == set(State)
+    command = [sys.executable, "-m", "tests.faults.killed", str(tmp_path), *(place.name for place in places)]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=LONG, check=True)
     told = dict(line.split() for line in done.stdout.splitlines())
-    assert len(told) == 2 * len(PLACES)
+    assert len(told) == 2 * len(places)
     assert set(told.values()) == {str(-signal.SIGKILL)}, done.stderr
-    for number, place in enumerate(PLACES):
+    for number, place in enumerate(places):
         with open_datafile(tmp_path / f"raw-{number}.h5") as record:
             assert record.status == "running"
         with open_datafile(tmp_path / f"flushed-{number}.h5") as record:

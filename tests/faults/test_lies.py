@@ -62,7 +62,7 @@ def _backend(monkeypatch: pytest.MonkeyPatch, make: Callable[[], Any]) -> Genera
 
 
 def _tone_sweep(out: Path) -> int:
-    return main(["run", "tone-sweep", "--omega", "10", "40", "--volts", "0.2", "--out", str(out), "--json"])
+    return main(["run", "tone-sweep", "--omega", "40", "--cycles", "4", "--out", str(out), "--json"])
 
 
 def _each(lies: list[Lie]) -> Any:
@@ -105,7 +105,7 @@ def test_a_lie_ends_the_run_with_the_backend_named(lie: Lie) -> None:
 
 
 @pytest.mark.usefixtures("plugged")
-@pytest.mark.parametrize("lie", _sessions(every=5))
+@pytest.mark.parametrize("lie", _sessions(every=10))
 def test_a_lie_ends_a_session_with_the_backend_named_and_the_file_whole(
     lie: Lie, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

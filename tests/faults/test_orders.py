@@ -4,6 +4,7 @@ import threading
 from collections.abc import Callable
 from queue import Queue
 
+import pytest
 from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
@@ -128,7 +129,18 @@ class Orders(RuleBasedStateMachine):
         assert not list(output_rules(self.story, Fault("any", lambda _: None, "", "", never, moves=moves)))
 
 
+def _settings(examples: int) -> settings:
+    return settings(
+        max_examples=examples, stateful_step_count=14, deadline=None, suppress_health_check=list(HealthCheck)
+    )
+
+
 TestOrders = Orders.TestCase
-TestOrders.settings = settings(
-    max_examples=250, stateful_step_count=14, deadline=None, suppress_health_check=list(HealthCheck)
-)
+TestOrders.settings = _settings(100)
+
+
+@pytest.mark.soak
+class TestManyOrders(Orders.TestCase):
+    """The same with more examples."""
+
+    settings = _settings(1000)

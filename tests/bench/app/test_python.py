@@ -26,6 +26,7 @@ from bench.datafile.reader import open_datafile
 from bench.events import Acquired, Event, Subscriber
 from sim.specimen import Block
 
+pytestmark = pytest.mark.usefixtures("shared_results")
 STORED = Path("tests/data/first_edition/harmonic_point.h5.xz")
 QUICK = {"omega": 20, "beta": 0.25, "measured_cycles": 8}
 

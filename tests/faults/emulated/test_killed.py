@@ -2,7 +2,9 @@
 
 import os
 import signal
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
+from functools import cache
 
 import numpy as np
 import pytest
@@ -27,30 +29,41 @@ KEEPERS = {
     "heartbeat": {"watchdog": False, "heartbeat": True},
     "neither": {"watchdog": False, "heartbeat": False},
 }
-CASES = [(name, keeper) for keeper in KEEPERS for name in (FEWER if keeper == "neither" else DRIVEN)]
+CASES = [(name, keeper) for keeper in KEEPERS for name in (DRIVEN if keeper == "watchdog" else FEWER)]
+MORE = [(name, "heartbeat") for name in DRIVEN if name not in FEWER]
+"""With the mark soak."""
 AT_A_TIME = 4
 
-Killed = dict[tuple[str, str], Future[Aftermath]]
+Killed = Callable[[str, str], Aftermath]
+"""What became of a case: place and keeper."""
+
+
+def _each(cases: Sequence[tuple[str, str]]) -> pytest.MarkDecorator:
+    more = [pytest.param(*case, marks=pytest.mark.soak) for case in MORE]
+    return pytest.mark.parametrize(("name", "keeper"), [*cases, *more])
 
 
 @pytest.fixture(scope="module")
-def killed(tmp_path_factory: pytest.TempPathFactory) -> Killed:
-    """All of them at once: most of it is waiting."""
+def killed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Killed]:
+    """All of `CASES` at once: most of it is waiting."""
     with ThreadPoolExecutor(AT_A_TIME) as pool:
-        return {
-            (name, keeper): pool.submit(kill_at, name, tmp_path_factory.mktemp("killed"), **KEEPERS[keeper])
-            for name, keeper in CASES
-        }
+
+        @cache
+        def begun(name: str, keeper: str) -> Future[Aftermath]:
+            return pool.submit(kill_at, name, tmp_path_factory.mktemp("killed"), **KEEPERS[keeper])
+
+        for case in CASES:
+            begun(*case)
+        yield lambda name, keeper: begun(name, keeper).result()
 
 
 def _place(name: str) -> Place:
     return next(place for place in PLACES if place.name == name)
 
 
-@pytest.mark.parametrize("keeper", ["watchdog", "heartbeat"])
-@pytest.mark.parametrize("name", DRIVEN)
+@_each([case for case in CASES if case[1] != "neither"])
 def test_the_chain_opens_by_itself(name: str, keeper: str, killed: Killed) -> None:
-    after = killed[name, keeper].result()
+    after = killed(name, keeper)
     assert after.exit_code == -signal.SIGKILL
     assert after.opened_after is not None
     assert after.opened_after < KEEPER + GRACE
@@ -62,7 +75,7 @@ def test_the_chain_opens_by_itself(name: str, keeper: str, killed: Killed) -> No
 @pytest.mark.parametrize("name", FEWER)
 def test_with_neither_the_output_holds_its_last_value_on_a_closed_relay(name: str, killed: Killed) -> None:
     """What the software cannot do, and the emergency stop is for."""
-    after = killed[name, "neither"].result()
+    after = killed(name, "neither")
     assert after.exit_code == -signal.SIGKILL
     assert after.opened_after is None
     quiet = after.truth.amplifier[-round(0.5 * KEEPER * SETTING.rate) :]
@@ -71,9 +84,9 @@ def test_with_neither_the_output_holds_its_last_value_on_a_closed_relay(name: st
     _within_limits(after)
 
 
-@pytest.mark.parametrize(("name", "keeper"), CASES)
+@_each(CASES)
 def test_the_next_program_makes_it_safe_and_the_file_is_readable(name: str, keeper: str, killed: Killed) -> None:
-    after = killed[name, keeper].result()
+    after = killed(name, keeper)
     assert "rockbench_out" in after.found
     assert (after.enabled_after, after.held_after) == (False, 0.0)
     with open_datafile(after.path) as record:

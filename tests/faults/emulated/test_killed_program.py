@@ -18,6 +18,7 @@ from bench.results import FILE
 from drivers.emulation.control import ask
 from drivers.hardware.rig import HardwareRig
 from tests.emulated import emulated
+from tests.installed import example
 from tests.patience import LONG
 
 pytestmark = [
@@ -31,8 +32,9 @@ LATE = 0.5
 
 
 @pytest.fixture(scope="module")
-def laboratory() -> Iterator[BenchConfiguration]:
-    with emulated("--lasers", "analogue", "--sample-rate", "1000") as configuration:
+def laboratory(tmp_path_factory: pytest.TempPathFactory) -> Iterator[BenchConfiguration]:
+    site = tmp_path_factory.mktemp("plugins") / "site"
+    with example(site, "tone_sweep"), emulated("--lasers", "analogue", "--sample-rate", "1000") as configuration:
         yield configuration
 
 
@@ -69,8 +71,8 @@ def test_the_chain_opens_by_itself(state: str, laboratory: BenchConfiguration, t
 
     file = tmp_path / "bench.toml"
     file.write_text(as_toml(laboratory), encoding="utf-8")
-    command = [sys.executable, "-m", "bench", "run", "harmonic", "--config", str(file), "--yes", "--out", str(tmp_path)]
-    command += ["--omega", "20", "--beta", "0.25", "--ramp-time", "1"]
+    command = [sys.executable, "-m", "bench", "run", "tone-sweep", "--config", str(file)]
+    command += ["--yes", "--out", str(tmp_path)]
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     try:
         _until(truth, _armed if state == "armed" else _driven, LONG)

@@ -20,7 +20,7 @@ from tests.patience import LONG
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="needs pseudo-terminals, and signals that stop a process")
 
-STALL, ACQUIRED = 1.0, 4.0
+STALL, ACQUIRED = 1.0, 3.0
 CLIENT = """
 import sys
 from pathlib import Path
@@ -31,7 +31,7 @@ from bench.engine.interface import EventStream, Requests, Unattended
 from bench.engine.steps import AcquireAtRest
 from bench.events import Acquired
 from drivers.hardware.rig import HardwareRig
-from protocols.harmonic.protocol import HarmonicPoint
+from tests.faults.setup import NoPoint
 
 given = BenchConfiguration.model_validate_json(sys.stdin.readline())
 
@@ -44,7 +44,7 @@ def plan():
 
 with HardwareRig(given.hardware, lead=given.lead_samples) as rig:
     recorder = Recorder(Path(sys.argv[1]), channels=rig.channels, sample_rate=rig.sample_rate,
-                        point_type=HarmonicPoint, metadata={})
+                        point_type=NoPoint, metadata={})
     engine = configured_engine(rig, given, EventStream(rig.clock, [recorder, began]), Requests(), Unattended())
     ending = engine.run(plan())
     recorder.close(ending.status, ending.reason)

@@ -71,7 +71,10 @@ def test_the_configuration_reaches_the_laboratory_and_sigterm_ends_it(tmp_path: 
         assert configuration.serves_itself
         names = {device.name for device in find_devices(configuration.hardware.daq.server)}
         assert configuration.hardware.daq.output.split("/")[0] in names
-        with open_rig(configuration, realtime=True) as rig:
+        # the client's own choice: how long it observes the lasers before their clocks count as known
+        lasers = configuration.hardware.lasers.model_copy(update={"observation_time": 1.5})
+        hardware = configuration.hardware.model_copy(update={"lasers": lasers})
+        with open_rig(configuration.model_copy(update={"hardware": hardware}), realtime=True) as rig:
             blocks = play(started(rig), np.zeros(400))
             assert [channel.name for channel in rig.channels][-2:] == ["laser_1", "laser_2"]
             assert blocks[0].counts.shape == (100, 4)

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from bench.app.cli.main import main
-from tests.bench.datafile.hostile import Kind, kinds
+from tests.bench.datafile.hostile import INSTEAD, Kind, additions, kinds
 from tests.installed import example
 
 SOON = 2.0
@@ -17,7 +17,10 @@ MEMORY = 200_000
 pytestmark = pytest.mark.seconds
 COMMANDS = ("file info", "file verify", "file recover", "export", "report", "replay", "analyse")
 KINDS = kinds()
-SOME = KINDS[:60] + KINDS[60::18]
+ADDED = len([*additions()])
+SOME = KINDS[:4] + KINDS[4:ADDED:3] + KINDS[ADDED::35]
+"""A third of the additions, and 26 replacements. Their step is prime to the number of objects and to that of what
+replaces them: nearly every replacement occurs."""
 
 
 @pytest.fixture(scope="module")
@@ -26,7 +29,7 @@ def sound(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("hostile")
     with example(folder / "site", "tone_sweep"):
         out = folder / "run"
-        assert main(["run", "tone-sweep", "--omega", "10", "40", "--volts", "0.2", "--out", str(out), "--json"]) == 0
+        assert main(["run", "tone-sweep", "--omega", "40", "--cycles", "4", "--out", str(out), "--json"]) == 0
         for number, command in enumerate(COMMANDS):
             assert main(_line(command, out / "campaign.h5", folder / f"sound {number}")) == 0
         yield out / "campaign.h5"
@@ -63,7 +66,9 @@ def _check(kind: Kind, command: str, sound: Path, folder: Path, capsys: pytest.C
 
 def test_there_are_at_least_500_kinds() -> None:
     assert len({kind.name for kind in KINDS}) >= 500
-    assert len(SOME) >= 100
+    assert len(SOME) >= 50
+    replacements = [kind.name.partition(": ")[2] for kind in SOME[-(len(KINDS) - ADDED) // 35 :]]
+    assert len(set(replacements)) >= 0.9 * len(INSTEAD)
 
 
 @pytest.mark.parametrize("number", range(len(SOME)), ids=lambda number: SOME[number].name)

@@ -1,5 +1,6 @@
 """Folders for results: runs that begin in the same second get one each, and a refused run leaves none."""
 
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -11,8 +12,10 @@ from sim.errors import InvalidInput
 from tests.command_line import main_with
 
 SAME_SECOND = """
-import sys, time
+import json, os, sys
+from contextlib import redirect_stderr, redirect_stdout
 from datetime import datetime
+from io import StringIO
 from pathlib import Path
 import bench.app.folders as output
 import bench.app.session
@@ -28,54 +31,69 @@ def start(protocol, configuration, *, out, **_):
         file.write(sys.argv[1])
     return SessionResult("completed", "", {"points": []}, "", False)
 
-print("ready", flush=True)
-sys.stdin.readline()
 bench.app.session.run_session = start
-sys.exit(main(["run", "harmonic", "--omega", "16", "--yes", *sys.argv[2:]]))
+for folder, *arguments in json.loads(sys.argv[2]):
+    os.chdir(folder)
+    print("ready", flush=True)
+    sys.stdin.readline()
+    with redirect_stdout(StringIO()), redirect_stderr(StringIO()) as errors:
+        code = main(["run", "harmonic", "--omega", "16", "--yes", *arguments])
+    print(json.dumps([code, errors.getvalue()]), flush=True)
 """
-"""A run with a clock that stands still and without its bench: what is left is the command and the folder."""
+"""Runs with a clock that stands still and without their bench: what is left is the command and the folder."""
+
+Together = dict[Path, list[tuple[int, str]]]
+"""The code and standard error of each of two runs that were let go in a folder at the same moment."""
 
 
-def together(folder: Path, *arguments: str) -> list[tuple[int, str]]:
-    """Two runs let go at the same moment; the code and standard error of each."""
+@pytest.fixture(scope="module")
+def together(tmp_path_factory: pytest.TempPathFactory) -> Together:
+    """Two processes, which run at the same moment in a folder, then in one with an older result in `mine`."""
+    free, taken = tmp_path_factory.mktemp("free"), tmp_path_factory.mktemp("taken")
+    (taken / "mine").mkdir()
+    (taken / "mine" / "campaign.h5").write_text("older")
+    rounds = json.dumps([[str(free)], [str(taken), "--out", "mine"]])
     running = [
         subprocess.Popen(
-            [sys.executable, "-c", SAME_SECOND, name, *arguments],
-            cwd=folder,
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
+            [sys.executable, "-c", SAME_SECOND, name, rounds], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
         )
         for name in ("first", "second")
     ]
+    found: Together = {free: [], taken: []}
+    for ended in found.values():
+        for process in running:
+            assert process.stdout is not None
+            assert process.stdout.readline() == "ready\n"
+        for process in running:
+            assert process.stdin is not None
+            process.stdin.write("\n")
+            process.stdin.flush()
+        for process in running:
+            assert process.stdout is not None
+            code, errors = json.loads(process.stdout.readline())
+            ended.append((code, errors))
     for process in running:
-        assert process.stdout is not None
-        assert process.stdout.readline() == "ready\n"
-    for process in running:
-        assert process.stdin is not None
-        process.stdin.write("\n")
-        process.stdin.flush()
-    ended = [process.communicate()[1] for process in running]
-    return [(process.returncode, errors) for process, errors in zip(running, ended, strict=True)]
+        process.communicate()
+    assert [process.returncode for process in running] == [0, 0]
+    return found
 
 
-def test_two_runs_in_the_same_second_have_a_folder_each(tmp_path: Path) -> None:
-    assert [code for code, _ in together(tmp_path)] == [0, 0]
+def test_two_runs_in_the_same_second_have_a_folder_each(together: Together) -> None:
+    folder, ended = next(iter(together.items()))
+    assert [code for code, _ in ended] == [0, 0]
     name = "harmonic-2026-01-02T03-04-05"
-    folders = sorted(path.name for path in (tmp_path / "runs").iterdir())
+    folders = sorted(path.name for path in (folder / "runs").iterdir())
     assert folders == [name, f"{name}-2"]
-    assert {(tmp_path / "runs" / folder / "campaign.h5").read_text() for folder in folders} == {"first", "second"}
+    assert {(folder / "runs" / each / "campaign.h5").read_text() for each in folders} == {"first", "second"}
 
 
-def test_a_folder_that_was_named_is_never_exchanged_for_another(tmp_path: Path) -> None:
-    (tmp_path / "mine").mkdir()
-    (tmp_path / "mine" / "campaign.h5").write_text("older")
-    for code, errors in together(tmp_path, "--out", "mine"):
+def test_a_folder_that_was_named_is_never_exchanged_for_another(together: Together) -> None:
+    folder, ended = [*together.items()][1]
+    for code, errors in ended:
         assert code == 2
         assert "it already contains campaign.h5" in errors
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["mine"]
-    assert (tmp_path / "mine" / "campaign.h5").read_text() == "older"
+    assert sorted(path.name for path in folder.iterdir()) == ["mine"]
+    assert (folder / "mine" / "campaign.h5").read_text() == "older"
 
 
 def test_many_processes_that_ask_at_once_get_different_folders(tmp_path: Path) -> None:

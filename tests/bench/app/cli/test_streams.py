@@ -5,6 +5,7 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Generator
 from io import StringIO
 from pathlib import Path
 
@@ -12,10 +13,18 @@ import pytest
 
 from bench.app.cli.main import main
 from bench.app.cli.streams import lasting
+from tests.installed import example
 from tests.patience import LONG
 
-RUN = ["run", "free-vibration", "--repeats", "1"]
+RUN = ["run", "tone-sweep", "--omega", "40", "--cycles", "4"]
+"""The shortest run that is measured, evaluated and drawn."""
 FULL = Path("/dev/full")
+
+
+@pytest.fixture(scope="module")
+def plugged(tmp_path_factory: pytest.TempPathFactory) -> Generator[None]:
+    with example(tmp_path_factory.mktemp("plugins") / "site", "tone_sweep"):
+        yield
 
 
 class Broken(StringIO):
@@ -25,9 +34,13 @@ class Broken(StringIO):
         super().__init__()
         self._number, self._left = number, after
 
+    @property
+    def gone(self) -> bool:
+        return self._left < 0
+
     def write(self, text: str) -> int:
         self._left -= 1
-        if self._left < 0:
+        if self.gone:
             raise OSError(self._number, os.strerror(self._number))
         return super().write(text)
 
@@ -41,15 +54,18 @@ PAIRS = [
 ]
 
 
+@pytest.mark.usefixtures("plugged")
 @pytest.mark.parametrize(("after", "number"), PAIRS)
 def test_a_run_goes_on_without_its_display(
     number: int, after: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(sys, "stderr", Broken(number, after))
+    monkeypatch.setattr(sys, "stderr", terminal := Broken(number, after))
     assert main([*RUN, "--out", str(tmp_path / "run"), "--json"]) == 0
+    assert terminal.gone
     assert json.loads(capsys.readouterr().out)["status"] == "completed"
 
 
+@pytest.mark.usefixtures("plugged")
 @pytest.mark.parametrize("how", ["closed pipe", "full disk"])
 def test_a_command_whose_standard_error_is_gone_ends_well(how: str, tmp_path: Path) -> None:
     if how == "full disk" and not FULL.exists():

@@ -4,6 +4,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from multiprocessing import Pipe
 from pathlib import Path
 from typing import Literal
@@ -81,18 +82,36 @@ class Client:
         self.until(lambda: State.RUNNING in self.states())
 
 
+@dataclass
+class Linked:
+    """A short run that is over, with all that it sent, and its file. Its last message did not come through, as for a
+    client that stood still at the end of a run that goes on without it."""
+
+    client: Client
+    file: Path
+    last: Ended
+
+
 @pytest.fixture(scope="module")
-def linked(tmp_path_factory: pytest.TempPathFactory) -> tuple[Client, Path]:
-    """A short run that is over, with all that it sent, and its file."""
+def linked(tmp_path_factory: pytest.TempPathFactory) -> Linked:
     folder = tmp_path_factory.mktemp("linked")
-    client = Client(begun(folder, realtime=False, cycles=6))
-    client.until_over()
-    return client, folder / FILE
+    keep, lost = SessionClient._keep, list[Ended]()  # pyright: ignore[reportPrivateUsage]
+
+    def forgetful(self: SessionClient, message: FromSession) -> None:
+        if isinstance(message, Ended) and not lost:
+            lost.append(message)
+        else:
+            keep(self, message)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(SessionClient, "_keep", forgetful)
+        client = Client(begun(folder, realtime=False, cycles=6))
+        client.until_over()
+    return Linked(client, folder / FILE, lost[0])
 
 
-def test_a_run_over_the_link_is_the_run_of_the_command_line(linked: tuple[Client, Path], tmp_path: Path) -> None:
-    client, file = linked
-    ended = client.over()
+def test_a_run_over_the_link_is_the_run_of_the_command_line(linked: Linked, tmp_path: Path) -> None:
+    client, file, ended = linked.client, linked.file, linked.last
     direct = run_session(
         SHAKING,
         Shaking(ShakingParameters(cycles=6), bench()),
@@ -103,7 +122,6 @@ def test_a_run_over_the_link_is_the_run_of_the_command_line(linked: tuple[Client
         realtime=False,
         about={"notes": "n"},
     )
-    assert isinstance(ended, Ended)
     assert (ended.status, ended.reason, ended.table) == (direct.status, direct.reason, direct.table)
     with open_datafile(file) as one, open_datafile(tmp_path / "direct" / FILE) as other:
         np.testing.assert_array_equal(one.drive(), other.drive())
@@ -122,8 +140,8 @@ def test_a_run_over_the_link_is_the_run_of_the_command_line(linked: tuple[Client
     assert client.link.status == "over"
 
 
-def test_traces_enclose_the_recorded_samples(linked: tuple[Client, Path]) -> None:
-    client, file = linked
+def test_traces_enclose_the_recorded_samples(linked: Linked) -> None:
+    client, file = linked.client, linked.file
     traces = [message for message in client.heard if isinstance(message, Traces)]
     assert len(traces) > 10
     with open_datafile(file) as record:
@@ -273,21 +291,10 @@ def test_extremes_are_those_of_each_bin() -> None:
     np.testing.assert_array_equal(high[:, 0], [1.0, 3.0, np.nan, 7.0])
 
 
-def test_a_run_whose_last_word_was_lost_is_told_by_its_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """As for a client that stood still at the end of a run that goes on without it."""
-    keep, lost = SessionClient._keep, list[FromSession]()  # pyright: ignore[reportPrivateUsage]
-
-    def forgetful(self: SessionClient, message: FromSession) -> None:
-        if isinstance(message, Ended) and not lost:
-            lost.append(message)
-        else:
-            keep(self, message)
-
-    monkeypatch.setattr(SessionClient, "_keep", forgetful)
-    ended = Client(begun(tmp_path / "run", realtime=False, cycles=6)).until_over()
+def test_a_run_whose_last_word_was_lost_is_told_by_its_files(linked: Linked) -> None:
+    ended, true = linked.client.over(), linked.last
     assert isinstance(ended, Ended)
-    (true,) = lost
-    assert isinstance(true, Ended)
+    assert ended is not true
     assert (ended.status, ended.reason, ended.summary) == (true.status, true.reason, true.summary)
 
 
