@@ -202,7 +202,7 @@ def test_what_is_no_record_is_refused_in_one_line(
     assert [each.name for each in path.parent.iterdir() if each != path] == []
 
 
-@pytest.mark.parametrize("missing", [100, 9_000, 30_000])
+@pytest.mark.parametrize("missing", [100, pytest.param(9_000, marks=pytest.mark.soak), 30_000])
 def test_of_a_truncated_file_the_beginning_is_kept(
     path: Path, missing: int, capsys: pytest.CaptureFixture[str]
 ) -> None:
