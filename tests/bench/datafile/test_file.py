@@ -144,7 +144,7 @@ def add_group(file: Any) -> None:
         (change_prediction, "/entry/prediction/alpha_2"),
         (lose_channel, "/entry/instrument/table/counts is missing"),
         (lose_events, "/entry/events/time is missing"),
-        (lose_rows, ": 2999; number written: 3000"),
+        (lose_rows, ": 2999; number counted as complete: 3000"),
         (add_dataset, "/entry/added has no checksum"),
         (plot_another, "attributes or links of /entry/data were changed"),
         (lead_elsewhere, "attributes or links of /entry/data were changed"),
