@@ -6,8 +6,9 @@ groups cover their attributes and link targets, such as the plotted data and the
 """
 
 import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field
+from functools import lru_cache
 from hashlib import sha256
 from typing import Any, cast
 
@@ -15,8 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.datafile import hdf5
+from bench.datafile.fields import Field
 from bench.datafile.findings_tables import FIT_VIEWS
-from bench.datafile.hdf5_reading import UNREADABLE, reason
+from bench.datafile.hdf5_reading import UNREADABLE, reading, reason
+from bench.datafile.rows import TABLE_CLASS
 from sim.sweep import Done
 
 GROUP = "checksums"
@@ -29,23 +32,28 @@ _GROUPS, _CONTENTS = f"{GROUP}/group", f"{GROUP}/group_attributes"
 class Checksums:
     """The checksum table of a new file, created last, when every dataset exists."""
 
-    def __init__(self, entry: hdf5.Group, changing: Iterable[str]) -> None:
-        """`changing` holds the paths of the datasets that are not yet final; their checksums are empty until `seal`."""
-        stored, groups = list[hdf5.Dataset](), {"/": of_group(hdf5.group(entry, "/"))}
-        _walk(entry, stored, groups)
-        later = {*changing}
-        self._entry, self._paths = entry, [each.name for each in stored]
-        self._values = {each.name: "" if each.name in later else of_values(each) for each in stored}
-        attributes = [of_attributes(each) for each in stored]
+    def __init__(
+        self, entry: hdf5.Group, changing: Iterable[str], created: Mapping[str, Sequence[Field]] | None = None
+    ) -> None:
+        """`changing` holds the paths of the datasets that are not yet final; their checksums are empty until `seal`.
+
+        `created` holds the fields of new, empty tables by path, whose attributes need not be read from the file.
+        """
+        found = _Contents({*changing}, created or {})
+        found.groups["/"] = of_group(hdf5.group(entry, "/"))
+        found.add(entry)
+        self._entry, self._values, groups = entry, found.values, found.groups
         group = hdf5.create_group(entry, GROUP, "NXcollection")
-        hdf5.write_texts(group, "dataset", self._paths, description="path of each dataset other than the checksums")
+        hdf5.write_texts(group, "dataset", self._values, description="path of each dataset other than the checksums")
         self._stored = hdf5.write_texts(
             group,
             "values",
             self._values.values(),
             description="SHA-256 of the dataset's uncompressed values; empty until closing for datasets that grow",
         )
-        hdf5.write_texts(group, "attributes", attributes, description="SHA-256 of the dataset's attributes as JSON")
+        hdf5.write_texts(
+            group, "attributes", found.attributes.values(), description="SHA-256 of the dataset's attributes as JSON"
+        )
         hdf5.write_texts(
             group, "group", groups, description="path of each group other than this one and the views of fits"
         )
@@ -81,30 +89,75 @@ def of_values(stored: hdf5.Dataset) -> str:
 
 def of_attributes(stored: hdf5.Dataset) -> str:
     """SHA-256 of the attributes of a dataset as JSON: names sorted, arrays as lists."""
-    return _of_json(_attributes(stored))
+    return _of_json(_plain_values(hdf5.attributes(stored)))
 
 
 def of_group(group: hdf5.Group) -> str:
     """SHA-256 of a group's attributes and link targets, both by name, as JSON."""
-    return _of_contents(group, {name: target for name, target in hdf5.members(group) if isinstance(target, str)})
+    links = {name: target for name, target in hdf5.members(group) if isinstance(target, str)}
+    return _of_contents(hdf5.attributes(group), links)
 
 
-def _of_contents(group: hdf5.Group, links: Mapping[str, str]) -> str:
-    return _of_json({"attributes": _attributes(group), "links": links})
+def _of_json(content: Mapping[str, Any]) -> str:
+    # an attribute of a type that this software never writes may have no JSON form; its `repr` is then hashed, and the
+    # checksum does not match
+    return sha256(json.dumps(content, sort_keys=True, default=repr).encode()).hexdigest()
 
 
-def _walk(group: hdf5.Group, stored: list[hdf5.Dataset], groups: dict[str, str]) -> None:
-    """Collect every dataset and the checksum of every group; each object is opened only once, to save time."""
-    links = dict[str, str]()
-    groups[group.name] = ""
-    for name, member in hdf5.members(group):
-        if isinstance(member, str):
-            links[name] = member
-        elif hdf5.is_dataset(member):
-            stored.append(member)
-        else:
-            _walk(cast(hdf5.Group, member), stored, groups)
-    groups[group.name] = _of_contents(group, links)
+def _plain_values(attributes: Mapping[str, Any]) -> dict[str, Any]:
+    return {
+        name: value if isinstance(value, str | int | float) else np.asarray(value).tolist()
+        for name, value in attributes.items()
+    }
+
+
+def _of_contents(attributes: Mapping[str, Any], links: Mapping[str, str]) -> str:
+    return _of_json({"attributes": _plain_values(attributes), "links": links})
+
+
+_OF_TABLE = _of_contents({"NX_class": TABLE_CLASS}, {})
+
+
+@lru_cache(maxsize=1024)
+def _of_field(field: Field) -> str:
+    return _of_json(_plain_values(field.attributes))
+
+
+class _Contents:
+    """Checksums by path: `values`, which are empty for the `changing` datasets, and `attributes` of datasets, and
+    `groups`.
+    """
+
+    def __init__(self, changing: Set[str], created: Mapping[str, Sequence[Field]]) -> None:
+        self._changing, self._created = changing, created
+        self.values, self.attributes, self.groups = dict[str, str](), dict[str, str](), dict[str, str]()
+
+    def add(self, group: hdf5.Group) -> None:
+        """Add a group and all objects below it; each object is opened only once, to save time."""
+        above, links = group.name, dict[str, str]()
+        # before its members, in the order of creation
+        self.groups[above] = ""
+        for name in hdf5.names(group):
+            path = f"{above}/{name}"
+            if path in self._created:
+                self._add_created(path, self._created[path])
+                continue
+            with reading(path):
+                member = hdf5.member_or_target(group, name)
+            if isinstance(member, str):
+                links[name] = member
+            elif hdf5.is_dataset(member):
+                self.values[path] = "" if path in self._changing else of_values(member)
+                self.attributes[path] = of_attributes(member)
+            else:
+                self.add(cast(hdf5.Group, member))
+        self.groups[above] = _of_contents(hdf5.attributes(group), links)
+
+    def _add_created(self, path: str, fields: Sequence[Field]) -> None:
+        self.groups[path] = _OF_TABLE
+        for each in fields:
+            self.values[f"{path}/{each.name}"] = ""
+            self.attributes[f"{path}/{each.name}"] = _of_field(each)
 
 
 def covered_groups(entry: hdf5.Group) -> Iterator[hdf5.Group]:
@@ -132,20 +185,6 @@ def read(entry: hdf5.Group) -> dict[str, tuple[str, str]]:
 
 def _bytes(values: NDArray[Any]) -> bytes:
     return values.tobytes()
-
-
-def _of_json(content: Mapping[str, Any]) -> str:
-    # an attribute of a type that this software never writes may have no JSON form; its `repr` is then hashed, and the
-    # checksum does not match
-    return sha256(json.dumps(content, sort_keys=True, default=repr).encode()).hexdigest()
-
-
-def _attributes(owner: hdf5.Group | hdf5.Dataset) -> dict[str, Any]:
-    return {name: _plain(value) for name, value in hdf5.attributes(owner).items()}
-
-
-def _plain(value: Any) -> Any:
-    return value if isinstance(value, str | int | float) else np.asarray(value).tolist()
 
 
 SMALL = 2**20
@@ -209,10 +248,10 @@ def integrity(entry: hdf5.Group, largest: int | None = SMALL, done: Done = lambd
     return Integrity(sum(path not in failing for path in known) - len(unchecked), failing, tuple(unchecked))
 
 
-def added(entry: hdf5.Group) -> Iterator[str]:
-    """Problem messages for the objects added to the file after its checksums."""
+def added(entry: hdf5.Group, stored: Iterable[hdf5.Dataset]) -> Iterator[str]:
+    """Problem messages for the objects added to the file after its checksums; `stored` are all its datasets."""
     known, groups = read(entry), read_groups(entry)
-    for each in hdf5.datasets(entry):
+    for each in stored:
         if each.name not in known and not each.name.startswith(f"/entry/{GROUP}/"):
             yield f"{each.name} has no checksum: it was added later"
     for each in covered_groups(entry) if groups else ():

@@ -47,7 +47,7 @@ class Copying:
 
     def _copy_dataset(self, stored: Dataset, target: Group, name: str) -> None:
         try:
-            attributes = {each: stored.attrs[each] for each in stored.attrs}
+            attributes = hdf5.attributes(stored)
             if "kind" in attributes:
                 Kind(attributes["kind"])
             if hdf5.grows(stored):
@@ -61,15 +61,13 @@ class Copying:
             # the values are meaningless without their attributes
             self.lost[stored.name] = f"{stored.name} cannot be read ({reason(error)})"
             return
-        for each, value in attributes.items():
-            copied.attrs[each] = value
+        hdf5.describe(copied, **attributes)
 
     def _copy_grown(self, stored: Dataset, target: Group, name: str) -> Dataset:
-        filters = {} if stored.compression is None else hdf5.FILTERS
-        copied = target.create_dataset(
-            name, shape=(0,), maxshape=(None,), dtype=stored.dtype, chunks=stored.chunks, **filters
-        )
-        rows = min(self.counted[part_of(stored.name, self.counted)], intact_rows(stored, self.size))
+        chunk = (stored.chunks or (1,))[0]
+        copied = hdf5.grow(target, name, stored.dtype, chunk, compress=stored.compression is not None)
+        rows = self.counted[part_of(stored.name, self.counted)]
+        rows = min(rows, intact_rows(stored, self.size)) if rows else 0
         done, step = 0, max(1, BYTES_AT_ONCE // stored.dtype.itemsize)
         while done < rows:
             count = min(step, rows - done)
@@ -143,16 +141,16 @@ def renew_tables(
                 rows_of(parent, name, fields)
 
 
-def cut(entry: hdf5.Group, counted: Mapping[str, int]) -> dict[str, int]:
-    """Truncate the datasets of each part to the length of the shortest, and make samples and blocks consistent.
+def cut(entry: hdf5.Group, growing: Iterable[hdf5.Dataset], counted: Mapping[str, int]) -> dict[str, int]:
+    """Truncate the `growing` datasets of each part to the length of the shortest, and make samples and blocks
+    consistent.
 
     The last known block is omitted if later `counted` blocks were lost, because its end is unknown. Returns the number
     of rows of every part.
     """
     parts: dict[str, list[hdf5.Dataset]] = {name: [] for name in counted}
-    for stored in hdf5.datasets(entry):
-        if hdf5.grows(stored):
-            parts[part_of(stored.name, counted)].append(stored)
+    for stored in growing:
+        parts[part_of(stored.name, counted)].append(stored)
     rows = {name: min((each.shape[0] for each in stored), default=0) for name, stored in parts.items()}
     row, run, first = (
         hdf5.dataset(entry, f"instrument/blocks/{name}")[: rows["blocks"]] for name in ("row", "run", "first")
@@ -161,7 +159,8 @@ def cut(entry: hdf5.Group, counted: Mapping[str, int]) -> dict[str, int]:
     rows["blocks"], rows["samples"] = _placed(row, run, first, rows["samples"], lost=lost)
     for name, stored in parts.items():
         for each in stored:
-            each.resize((rows[name],))
+            if each.shape[0] != rows[name]:
+                each.resize((rows[name],))
     return rows
 
 

@@ -50,34 +50,31 @@ class Field:
 
     @property
     def dtype(self) -> np.dtype[Any]:
-        """The in-memory type of the stored values; integers that may be absent are float64, because they need NaN."""
+        """The in-memory type of the stored values; integers that may be absent are float64, because they need NaN.
+
+        All strings have a fixed length, because HDF5 stores variable-length strings separately from their dataset and a
+        reader of a file that is being written may find one without the other.
+        """
         if self.kind is Kind.TEXT:
             return hdf5.text_type(TEXT_WIDTH)
         if self.kind is Kind.SWITCH:
             return np.dtype(np.int8)
         return np.dtype(np.int64 if self.kind is Kind.WHOLE and not self.optional else np.float64)
 
-    def create(self, parent: hdf5.Group) -> hdf5.Dataset:
+    @property
+    def attributes(self) -> dict[str, str | np.int8]:
+        """The attributes of this field's dataset, in the order in which they are written."""
+        unit = {} if self.kind is Kind.TEXT else {"units": self.unit or "1"}
+        about = {"description": self.description, "kind": self.kind.value}
+        return {**unit, **about, "optional": np.int8(self.optional)}
+
+    def create(self, parent: hdf5.Group) -> None:
         """Create the empty dataset of this field, without compression unless packed, so that rows are appended in
         place.
         """
-        if self.kind is Kind.TEXT:
-            made = hdf5.grow_texts(
-                parent, self.name, TEXT_WIDTH, description=self.description, chunk=ROWS_PER_CHUNK // 4
-            )
-        else:
-            made = hdf5.grow_numbers(
-                parent,
-                self.name,
-                self.dtype,
-                unit=self.unit or "1",
-                description=self.description,
-                chunk=ROWS_PER_PACKED_CHUNK if self.packed else ROWS_PER_CHUNK,
-                compress=self.packed,
-            )
-        hdf5.describe(made, kind=self.kind.value)
-        hdf5.describe_switch(made, "optional", value=self.optional)
-        return made
+        chunk = ROWS_PER_PACKED_CHUNK if self.packed else ROWS_PER_CHUNK
+        rows = chunk // 4 if self.kind is Kind.TEXT else chunk
+        hdf5.grow(parent, self.name, self.dtype, rows, compress=self.packed, attributes=self.attributes)
 
     def encode(self, value: Any) -> Any:
         """The stored form of a value."""

@@ -1,11 +1,12 @@
 # pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false
 """Typed interface to the part of h5py used here; h5py publishes no types.
 
-The numeric datasets of a new file are created by `write_numbers` or `grow_numbers`, which require a unit.
+The numeric datasets of a new file are created by `write_numbers` or `grow_numbers`, which require a unit, or as a field
+of a table, which has one.
 """
 
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from contextlib import AbstractContextManager, suppress
 from pathlib import Path
 from typing import Any, cast
@@ -15,9 +16,12 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from bench.datafile.access import VERSIONS, Quiet, is_let_go, locking, open_living, open_to_write
+from bench.datafile.hdf5_creation import GZIP_LEVEL, create_fixed, create_growing
+from bench.datafile.hdf5_creation import copy_member as copy_member
+from bench.datafile.hdf5_creation import describe as describe
+from bench.datafile.hdf5_creation import memory_file as memory_file
+from bench.datafile.hdf5_creation import text_type as text_type
 from bench.datafile.hdf5_objects import attributes as attributes
-from bench.datafile.hdf5_objects import describe as describe
-from bench.datafile.hdf5_objects import describe_switch as describe_switch
 from bench.datafile.hdf5_reading import Dataset as Dataset
 from bench.datafile.hdf5_reading import File as File
 from bench.datafile.hdf5_reading import Group as Group
@@ -29,6 +33,7 @@ from bench.datafile.hdf5_reading import groups as groups
 from bench.datafile.hdf5_reading import grows as grows
 from bench.datafile.hdf5_reading import has as has
 from bench.datafile.hdf5_reading import is_dataset as is_dataset
+from bench.datafile.hdf5_reading import member_or_target as member_or_target
 from bench.datafile.hdf5_reading import members as members
 from bench.datafile.hdf5_reading import names as names
 from bench.datafile.hdf5_reading import place as place
@@ -41,7 +46,7 @@ _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 PAGE = 1024
 # Filters that HDF5 libraries usually include, so that MATLAB and web viewers can read the file; measured in
 # docs/decisions, no. 10.
-FILTERS: dict[str, Any] = {"shuffle": True, "compression": "gzip", "compression_opts": 1}
+FILTERS: dict[str, Any] = {"shuffle": True, "compression": "gzip", "compression_opts": GZIP_LEVEL}
 
 
 def create(path: Path) -> File:
@@ -129,7 +134,7 @@ def view(parent: Group, name: str, source: Dataset, part: slice) -> Dataset:
 
 def write_numbers(parent: Group, name: str, values: object, *, unit: str, description: str) -> Dataset:
     """Create a dataset of the numbers `values`; a scalar dataset if `values` is a scalar."""
-    made = parent.create_dataset(name, data=np.asarray(values))
+    made = cast(Dataset, create_fixed(parent, name, np.asarray(values)))
     describe(made, units=unit, description=description)
     return made
 
@@ -138,25 +143,22 @@ def grow_numbers(
     parent: Group, name: str, dtype: DTypeLike, *, unit: str, description: str, chunk: int, compress: bool
 ) -> Dataset:
     """Create an empty, growing dataset of numbers."""
-    filters = FILTERS if compress else {}
-    made = parent.create_dataset(name, shape=(0,), maxshape=(None,), dtype=dtype, chunks=(chunk,), **filters)
-    describe(made, units=unit, description=description)
-    return made
+    attributes = {"units": unit, "description": description}
+    return grow(parent, name, np.dtype(dtype), chunk, compress=compress, attributes=attributes)
 
 
-def text_type(width: int) -> np.dtype[Any]:
-    """Type for UTF-8 strings of `width` bytes, in memory and in the file, because HDF5 does not convert plain bytes."""
-    return cast("np.dtype[Any]", h5py.string_dtype("utf-8", width))
-
-
-def grow_texts(parent: Group, name: str, width: int, *, description: str, chunk: int) -> Dataset:
-    """Create an empty, growing dataset of UTF-8 strings of at most `width` bytes.
-
-    All strings have a fixed length, because HDF5 stores variable-length strings separately from their dataset and a
-    reader of a file that is being written may find one without the other.
-    """
-    made = parent.create_dataset(name, shape=(0,), maxshape=(None,), dtype=text_type(width), chunks=(chunk,))
-    describe(made, description=description)
+def grow(
+    parent: Group,
+    name: str,
+    dtype: np.dtype[Any],
+    chunk: int,
+    *,
+    compress: bool,
+    attributes: Mapping[str, Any] | None = None,
+) -> Dataset:
+    """Create an empty, growing dataset of numbers, whose `attributes` include the unit, or of strings (`text_type`)."""
+    made = cast(Dataset, create_growing(parent, name, dtype, chunk, compress=compress))
+    describe(made, **(attributes or {}))
     return made
 
 
@@ -164,7 +166,7 @@ def write_text(parent: Group, name: str, text: str, *, width: int = 0, descripti
     """Create a scalar string as long as `text`, or of `width` bytes if it is to be replaced later."""
     stored = text.encode()
     kind = text_type(max(width, len(stored), 1))
-    made = parent.create_dataset(name, data=np.array(stored, dtype=kind), dtype=kind)
+    made = cast(Dataset, create_fixed(parent, name, np.array(stored, dtype=kind)))
     if description:
         describe(made, description=description)
     return made
@@ -178,7 +180,7 @@ def write_texts(parent: Group, name: str, texts: Iterable[str], *, description: 
     """Create a dataset of the strings `texts`."""
     stored = [text.encode() for text in texts]
     kind = text_type(max([1, *map(len, stored)]))
-    made = parent.create_dataset(name, data=np.array(stored, dtype=kind), dtype=kind)
+    made = cast(Dataset, create_fixed(parent, name, np.array(stored, dtype=kind)))
     describe(made, description=description)
     return made
 

@@ -126,11 +126,21 @@ def members(parent: Group, lost: dict[str, str] | None = None) -> Iterator[tuple
         names, read_only = _record_loss(parent.name, error, lost), False
     for name in names:
         try:
-            member = _member_or_target(parent, name, read_only)
+            member = member_or_target(parent, name, read_only=read_only)
         except UNREADABLE as error:
             _record_loss(f"{parent.name.rstrip('/')}/{name}", error, lost)
         else:
             yield name, member
+
+
+def member_or_target(parent: Group, name: str, *, read_only: bool = False) -> "Dataset | Group | str":
+    """The member `name`, or the path of the target if it is a soft link. Raises KeyError for any other link without a
+    target.
+    """
+    if is_hard_link(parent, name):
+        return cast("Dataset | Group", stored_member(parent, name, read_only=read_only))
+    found = cast(object, cast(h5py.Group, parent).get(name, getlink=True))
+    return found.path if isinstance(found, h5py.SoftLink) else cast("Dataset | Group", parent[name])
 
 
 def datasets(parent: Group, lost: dict[str, str] | None = None) -> Iterator[Dataset]:
@@ -225,16 +235,6 @@ def read_texts(stored: NDArray[Any]) -> list[str]:
 
 def _is_read_only(parent: Group) -> bool:
     return cast(h5py.Group, parent).file.mode == "r"
-
-
-def _member_or_target(parent: Group, name: str, read_only: bool = False) -> "Dataset | Group | str":
-    """The member `name`, or the path of the target if it is a soft link. Raises KeyError for any other link without a
-    target.
-    """
-    if is_hard_link(parent, name):
-        return cast("Dataset | Group", stored_member(parent, name, read_only=read_only))
-    found = cast(object, cast(h5py.Group, parent).get(name, getlink=True))
-    return found.path if isinstance(found, h5py.SoftLink) else cast("Dataset | Group", parent[name])
 
 
 def _record_loss(path: str, error: BaseException, lost: dict[str, str] | None) -> list[str]:

@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -138,26 +138,27 @@ def verify(path: Path, done: Done = lambda _done, _all: None) -> Verdict:
     judging = path.is_file() and not is_let_go(path)
     with open_file(path, judging=judging, kinds=(FORMAT, ANALYSIS)) as file:
         try:
+            entry = hdf5.group(file, "entry")
+            stored = [*hdf5.datasets(entry)]
             if hdf5.attribute(file, "format") == ANALYSIS:
-                return _verdict(hdf5.group(file, "entry"), analysis_problems(file, path), done)
-            record = DataFile(file)
-            return _verdict(hdf5.group(file, "entry"), _of_record(record, path.stat().st_size), done)
+                return _verdict(entry, stored, analysis_problems(file, path), done)
+            return _verdict(entry, stored, _of_record(DataFile(file), stored, path.stat().st_size), done)
         except DataFileError as error:
             return Verdict(0, 0, (str(error),))
         except UNREADABLE as error:
             return Verdict(0, 0, (f"the file is damaged ({reason(error)})",))
 
 
-def _verdict(entry: hdf5.Group, problems: Iterator[str], done: Done) -> Verdict:
+def _verdict(entry: hdf5.Group, stored: Sequence[hdf5.Dataset], problems: Iterator[str], done: Done) -> Verdict:
     found = [*problems]
     has = hdf5.has(entry, GROUP)
     judged = integrity(entry, None, done)
-    found += [*(added(entry) if has else ()), *judged.failing.values()]
-    stored = [each for each in hdf5.datasets(entry) if not each.name.startswith(f"/entry/{GROUP}/")]
-    return Verdict(len(stored), judged.compared if has else 0, tuple(found))
+    found += [*(added(entry, stored) if has else ()), *judged.failing.values()]
+    count = sum(not each.name.startswith(f"/entry/{GROUP}/") for each in stored)
+    return Verdict(count, judged.compared if has else 0, tuple(found))
 
 
-def _of_record(record: DataFile, size: int) -> Iterator[str]:
+def _of_record(record: DataFile, stored: Sequence[hdf5.Dataset], size: int) -> Iterator[str]:
     closed = record.status != Status.RUNNING
     if not closed:
         yield (
@@ -169,8 +170,8 @@ def _of_record(record: DataFile, size: int) -> Iterator[str]:
     entry = hdf5.group(record.file, "entry")
     if record.format_version > 1 and GROUP not in entry:
         yield "the checksums are missing"
-    for stored in hdf5.datasets(entry):
-        yield from _of_layout(stored, record.counted, size, closed=closed)
+    for each in stored:
+        yield from _of_layout(each, record.counted, size, closed=closed)
     plot = hdf5.group(entry, PLOT)
     named = [plot.attrs.get("signal"), *plot.attrs.get("axes", ())]
     yield from (

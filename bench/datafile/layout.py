@@ -108,14 +108,13 @@ class Parts:
 
 def build(file: hdf5.File, skeleton: Skeleton) -> Parts:
     """Create every group and dataset of a checked skeleton."""
-    file.attrs["NX_class"], file.attrs["default"] = "NXroot", "entry"
-    file.attrs["format"], file.attrs["format_version"] = FORMAT, FORMAT_VERSION
-    file.attrs["wording"], file.attrs["intervals"] = WORDING, INTERVALS
+    hdf5.describe(file, NX_class="NXroot", default="entry", format=FORMAT, format_version=FORMAT_VERSION)
+    hdf5.describe(file, wording=WORDING, intervals=INTERVALS)
     entry = hdf5.create_group(file, "entry", "NXentry")
-    entry.attrs["default"] = "data"
+    hdf5.describe(entry, default="data")
     hdf5.write_text(entry, "title", skeleton.title)
     hdf5.write_text(entry, "start_time", now(), description="wall-clock time of the creation of this file, ISO 8601")
-    hdf5.write_text(entry, "program_name", "rocking-bench").attrs["version"] = software_version()
+    hdf5.describe(hdf5.write_text(entry, "program_name", "rocking-bench"), version=software_version())
 
     metadata = hdf5.create_group(entry, "metadata", "NXcollection")
     for name, text in skeleton.metadata.items():
@@ -133,13 +132,14 @@ def build(file: hdf5.File, skeleton: Skeleton) -> Parts:
     )
     chunk = chunk_of(skeleton.sample_rate, skeleton.chunk_time)
     samples = Samples(instrument, skeleton.channels, chunk, create_plot(entry, skeleton.channels, chunk))
-    rows = dict[str, Rows]()
-    for path, fields in {**TABLES, **skeleton.own, "points": fields_of(skeleton.point_type)}.items():
+    growing, rows = {**TABLES, **skeleton.own, "points": fields_of(skeleton.point_type)}, dict[str, Rows]()
+    for path, fields in growing.items():
         folder, _, name = path.rpartition("/")
         rows[name] = rows_of(instrument if folder else entry, name, fields, samples.packer)
     replaced = create_ends(entry, counters(skeleton.own))
     grown = [*samples.grown, *(each for table in rows.values() for each in table.grown)]
-    checksums = Checksums(entry, [*(each.path for each in grown), *(each.name for each in replaced)])
+    changing = [*(each.path for each in grown), *(each.name for each in replaced)]
+    checksums = Checksums(entry, changing, {f"/entry/{path}": fields for path, fields in growing.items()})
     return Parts(samples, rows, grown, *replaced, checksums)
 
 
@@ -152,7 +152,7 @@ def create_ends(
     complete = hdf5.write_numbers(
         entry, "complete", np.zeros(len(counted), dtype=np.int64), unit="1", description="complete rows of each part"
     )
-    complete.attrs["parts"] = " ".join(counted)
+    hdf5.describe(complete, parts=" ".join(counted))
     return (
         complete,
         hdf5.write_text(entry, "status", Status.RUNNING, width=STATUS_WIDTH),

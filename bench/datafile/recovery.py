@@ -198,7 +198,8 @@ def _rebuild(record: DataFile, path: Path, temporary: Path, target: Path, progre
         renew_drive(entry)
         lines = list(read_journal(journal_path(path)))
         renew_tables(entry, copying.lost, record.own_tables, lines)
-        cut(entry, copying.counted)
+        growing = [each for each in hdf5.datasets(entry) if hdf5.grows(each)]
+        cut(entry, growing, copying.counted)
         gone = {at: damaged for at, damaged in copying.lost.items() if not _is_renewed(at)}
         damage = gone | {at: damaged for at, damaged in judged.failing.items() if not _is_renewed(at)}
         events = points = 0
@@ -206,7 +207,7 @@ def _rebuild(record: DataFile, path: Path, temporary: Path, target: Path, progre
             events, points = add_lost_events(entry, lines)
         except DataFileError as error:
             damage["journal"] = str(error)
-        grown = {each.name: each.shape[0] for each in hdf5.datasets(entry) if hdf5.grows(each)}
+        grown = {each.name: each.shape[0] for each in growing}
         parts = {at: part_of(at, copying.counted) for at in grown}
         lengths = {parts[at]: rows for at, rows in grown.items()}
         lost = {part: left for part, rows in copying.counted.items() if (left := rows - lengths.get(part, 0)) > 0}

@@ -3,8 +3,9 @@
 import zlib
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from functools import cache, cached_property
 from hashlib import sha256
-from itertools import chain
+from itertools import chain, count
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,12 @@ from numpy.typing import NDArray
 from bench.datafile import hdf5
 from bench.datafile.fields import ROWS_PER_PACKED_CHUNK, Field, Kind
 
+TABLE_CLASS = "NXcollection"
+"""NeXus class of the group of a table."""
+
 THREADS = 2
+
+_NUMBERS = count()
 
 
 class Packer:
@@ -69,15 +75,21 @@ class Growing:
     end of a long run.
     """
 
-    def __init__(self, stored: hdf5.Dataset, packer: Packer | None = None) -> None:
-        """`packer`, if given, compresses and writes the appended rows."""
-        self._stored, self.path = stored, stored.name
+    def __init__(self, file: hdf5.Group, path: str, packer: Packer | None = None) -> None:
+        """`path` is the absolute path of the dataset; `packer`, if given, compresses and writes the appended rows."""
+        self._file, self.path = file, path
         self._packer = packer
         self._digest = sha256()
 
+    @cached_property
+    def _stored(self) -> hdf5.Dataset:
+        # opened with the first rows, because most tables of a run stay empty
+        return hdf5.dataset(self._file, self.path)
+
     def reopen(self, file: hdf5.File) -> None:
         """Append to the dataset of the reopened file from now on."""
-        self._stored = hdf5.dataset(file, self.path)
+        self._file = file
+        self.__dict__.pop("_stored", None)
 
     @property
     def checksum(self) -> str:
@@ -95,13 +107,29 @@ class Growing:
         self._digest.update(kept.view(np.uint8).data)
 
 
+@cache
+def _empty(fields: tuple[Field, ...]) -> str:
+    """Name, in the file in memory, of an empty table with these fields.
+
+    Tables of files are copies of it, which take a fifth of the time of creating them: a process may write many files.
+    """
+    name = str(next(_NUMBERS))
+    group = hdf5.create_group(hdf5.memory_file(), name, TABLE_CLASS)
+    for field in fields:
+        field.create(group)
+    return name
+
+
 class Rows:
     """Table stored as a group with one dataset per field; `write` writes the buffered rows."""
 
     def __init__(self, parent: hdf5.Group, name: str, fields: Sequence[Field], packer: Packer | None = None) -> None:
         """`packer` compresses the datasets of fields that are declared as packed."""
-        group = hdf5.create_group(parent, name, "NXcollection")
-        self._columns = [(field, Growing(field.create(group), packer if field.packed else None)) for field in fields]
+        hdf5.copy_member(hdf5.memory_file(), _empty(tuple(fields)), parent, name)
+        self._columns = [
+            (field, Growing(parent, f"{parent.name}/{name}/{field.name}", packer if field.packed else None))
+            for field in fields
+        ]
         self._fields, self._texts = tuple(fields), tuple(field.kind is Kind.TEXT for field in fields)
         self._pending: list[tuple[Any, ...]] = []
         self._written = 0

@@ -43,7 +43,7 @@ def create_plot(entry: hdf5.Group, channels: Sequence[Channel], chunk: int) -> h
         chunk=chunk,
         compress=True,
     )
-    time.attrs["long_name"] = "bench time [s]"
+    hdf5.describe(time, long_name="bench time [s]")
     for channel in channels:
         hdf5.link(data, channel.name, f"/entry/instrument/{channel.name}/counts")
         factor, offset = companions(channel.name)
@@ -107,7 +107,7 @@ class Samples:
         stored = [_create_channel(instrument, channel, self.chunk) for channel in channels]
         stored += [create_drive(instrument, self.chunk), time]
         self.packer = Packer()
-        self.grown = [Growing(each, self.packer) for each in stored]
+        self.grown = [Growing(instrument, each.name, self.packer) for each in stored]
         self._pending: list[tuple[Counts, NDArray[np.float32], NDArray[np.float64]]] = []
         self._waiting = 0
         self._written = 0
@@ -189,17 +189,16 @@ def _create_channel(instrument: hdf5.Group, channel: Channel, chunk: int) -> hdf
     counts = hdf5.grow_numbers(
         sensor, "counts", channel.storage, unit="counts", description=description, chunk=chunk, compress=True
     )
-    counts.attrs["long_name"] = f"{channel.name} [counts]"
-    counts.attrs["scale"], counts.attrs["offset"] = channel.scale, channel.offset
+    hdf5.describe(counts, long_name=f"{channel.name} [counts]", scale=channel.scale, offset=channel.offset)
     if channel.higher:
         counts.attrs["higher"] = np.array(channel.higher)
     if channel.faults:
-        counts.attrs["faults"] = json.dumps({str(count): text for count, text in channel.faults.items()})
+        hdf5.describe(counts, faults=json.dumps({str(count): text for count, text in channel.faults.items()}))
     if channel.delay or channel.delay_uncertainty:
-        counts.attrs["delay"], counts.attrs["delay_uncertainty"] = channel.delay, channel.delay_uncertainty
-    counts.attrs["value_units"] = channel.unit
+        hdf5.describe(counts, delay=channel.delay, delay_uncertainty=channel.delay_uncertainty)
+    hdf5.describe(counts, value_units=channel.unit)
     counts.attrs["valid"] = np.array(channel.valid, dtype=np.int64)
-    counts.attrs["quantity"], counts.attrs["device"] = channel.quantity, channel.device
+    hdf5.describe(counts, quantity=channel.quantity, device=channel.device)
     return counts
 
 
@@ -211,5 +210,5 @@ def create_drive(instrument: hdf5.Group, chunk: int) -> hdf5.Dataset:
     voltage = hdf5.grow_numbers(
         drive, "voltage", np.float32, unit="V", description="drive as sent to the amplifier", chunk=chunk, compress=True
     )
-    voltage.attrs["long_name"] = "drive [V]"
+    hdf5.describe(voltage, long_name="drive [V]")
     return voltage

@@ -103,15 +103,16 @@ class _Judge:
         check_attributes(member, path)
 
     def _dataset(self, stored: Any, path: str) -> None:
-        made, dtype = stored.id.get_create_plist(), stored.dtype
+        made, dtype, space = stored.id.get_create_plist(), stored.dtype, stored.id.get_space()
         # other programs may add strings of any length
         known = dtype.kind in KINDS or h5py.check_string_dtype(dtype) is not None
         if not known or dtype.itemsize > LARGEST_VALUE or dtype.subdtype is not None:
             raise DataFileError(f"{path} has values of type {dtype!s:.40}, which this program never writes")
-        if len(shape := stored.shape) > 2 or stored.id.get_space().get_simple_extent_type() == h5py.h5s.NULL:
-            raise DataFileError(f"{path} has the shape {shape}; at most two dimensions are allowed")
-        layout = made.get_layout()
-        if layout == h5py.h5d.VIRTUAL:
+        if space.get_simple_extent_type() == h5py.h5s.NULL:
+            raise DataFileError(f"{path} has no values, not even an empty array")
+        if len(space.shape) > 2:
+            raise DataFileError(f"{path} has the shape {stored.shape}; at most two dimensions are allowed")
+        if (layout := made.get_layout()) == h5py.h5d.VIRTUAL:
             self._view(made, path)
             return
         if made.get_external_count():
@@ -123,7 +124,7 @@ class _Judge:
             chunk = dtype.itemsize * prod(made.get_chunk())
             if chunk > LARGEST_CHUNK:
                 raise DataFileError(f"{path} has chunks of {chunk} bytes; at most {LARGEST_CHUNK} are allowed")
-        self._values += dtype.itemsize * prod(shape)
+        self._values += dtype.itemsize * prod(space.shape)
         if self._values > UNPACKED * self._size + SPARE:
             claim = f"the datasets up to {path} declare {self._values} bytes of values in a file of {self._size} bytes"
             raise DataFileError(f"{claim}: the file is truncated or invalid")
@@ -141,11 +142,17 @@ def check_attributes(owner: Any, path: str) -> None:
     """Raise DataFileError if there are more or larger attributes than are allowed."""
     if (count := h5py.h5a.get_num_attrs(owner.id)) > MOST_ATTRIBUTES:
         raise DataFileError(f"{path} has {count} attributes; at most {MOST_ATTRIBUTES} are allowed")
-    for number in range(count):
-        if (size := h5py.h5a.get_info(owner.id, index=number).data_size) > LARGEST_ATTRIBUTE:
-            name = h5py.h5a.open(owner.id, index=number).name.decode(errors="replace")
+    sizes: dict[bytes, int] = {}
+
+    def note(name: bytes, info: Any) -> None:
+        sizes[name] = info.data_size
+
+    h5py.h5a.iterate(owner.id, note, info=True)
+    for name, size in sizes.items():
+        if size > LARGEST_ATTRIBUTE:
             raise DataFileError(
-                f"the attribute {name} of {path} has {size} bytes; at most {LARGEST_ATTRIBUTE} are allowed"
+                f"the attribute {name.decode(errors='replace')} of {path} has {size} bytes; at most"
+                f" {LARGEST_ATTRIBUTE} are allowed"
             )
 
 

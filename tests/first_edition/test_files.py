@@ -1,6 +1,6 @@
 """Data files of the first edition, one of each protocol: opened, verified, replayed, analysed, reported, exported.
 
-Without `-m soak` all are opened, verified and replayed but the longest, and three are put through the rest as well.
+Without `-m soak` all are opened, verified and replayed but the longest, and some are put through the rest as well.
 """
 
 import json
@@ -97,7 +97,8 @@ def test_it_is_analysed_again(file: Path, rockbench: Rockbench, same_arithmetic:
     assert rockbench("file", "verify", again).code == 0
 
 
-@of(QUICK)
+# the report of `check` is read by `test_inventory`, section by section
+@of(QUICK - {"check"})
 def test_it_is_reported(file: Path, rockbench: Rockbench, tmp_path: Path) -> None:
     page = tmp_path / "report.html"
     done = rockbench("report", file, "--html", page)
@@ -108,7 +109,8 @@ def test_it_is_reported(file: Path, rockbench: Rockbench, tmp_path: Path) -> Non
     assert "<svg" in text or "<img" in text
 
 
-@of(QUICK)
+# `test_inventory` exports `check`
+@of({"free_rocking"})
 @pytest.mark.parametrize("format", ["mat", "csv", "uff", "parquet"])
 def test_it_is_exported(file: Path, format: str, rockbench: Rockbench, tmp_path: Path) -> None:
     folder = tmp_path / "exported"

@@ -22,9 +22,10 @@ QUICK = {
     "earthquake",
     "free_rocking",
     "free_vibration",
-    "harmonic_point",
     "harmonic_springs",
 }
+"""One run of each protocol that is not long. The other run of the harmonic protocol is replayed from its file, with the
+twin, by `test_files`."""
 
 RENAMED = {"predicted for the asked motion": "predicted for the requested motion"}
 """What keys and texts of the first edition are called today, by each part of them that was renamed: standard terms."""

@@ -142,12 +142,16 @@ def test_files_that_are_truncated_while_they_are_written_do_not_stop_the_process
     assert (done.returncode, done.stdout) == (0, "over\n"), done.stderr
 
 
+SHARES = (0.0, 0.001, 0.01, 0.05, 0.2, 0.5, 0.8, 0.95, 0.999)
+
+
 @pytest.mark.seconds
-def test_readers_of_a_truncated_file_refuse_it_soon(tmp_path: Path) -> None:
+@pytest.mark.parametrize("shares", [(0.0, 0.01, 0.5, 0.999), pytest.param(SHARES, marks=pytest.mark.soak)])
+def test_readers_of_a_truncated_file_refuse_it_soon(tmp_path: Path, shares: tuple[float, ...]) -> None:
     path, cut = tmp_path / "run.h5", tmp_path / "cut.h5"
     recorder = _recording(path)
     whole = path.read_bytes()
-    for share in (0.0, 0.001, 0.01, 0.05, 0.2, 0.5, 0.8, 0.95, 0.999):
+    for share in shares:
         cut.write_bytes(whole[: int(share * len(whole))])
         begun = time.monotonic()
         for read in (overview, open_datafile):

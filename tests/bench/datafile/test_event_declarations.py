@@ -83,9 +83,16 @@ class Tone(Event):
     loud: bool = column("1", "whether it is loud", default=False)
 
 
-def test_an_event_of_a_protocol_is_recorded_read_exported_and_recovered(tmp_path: Path) -> None:
-    path, copy = tmp_path / "campaign.h5", tmp_path / "recovered.h5"
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    """A file with two events of a protocol."""
+    path = tmp_path / "campaign.h5"
     record(begin(path, events=(Tone,)), block(0, 10), Tone(0.25, time=1.0), Tone(0.5, True, time=2.0))
+    return path
+
+
+def test_an_event_of_a_protocol_is_recorded_read_exported_and_recovered(path: Path) -> None:
+    copy = path.with_name("recovered.h5")
     expected = [{"time": 1.0, "level": 0.25, "loud": False}, {"time": 2.0, "level": 0.5, "loud": True}]
     recover(path, copy)
     for each in (path, copy):
@@ -111,10 +118,11 @@ def test_rows_that_only_the_journal_has_are_recovered(tmp_path: Path) -> None:
         assert kept.rows_of(Tone)[1] == columns
 
 
-@pytest.mark.parametrize("column", ["level", "loud", "time"])
-def test_a_lost_column_of_a_table_of_a_protocol_is_restored_from_the_journal(tmp_path: Path, column: str) -> None:
-    path, copy = tmp_path / "campaign.h5", tmp_path / "recovered.h5"
-    record(begin(path, events=(Tone,)), block(0, 10), Tone(0.25, time=1.0), Tone(0.5, True, time=2.0))
+@pytest.mark.parametrize(
+    "column", ["level", *(pytest.param(name, marks=pytest.mark.soak) for name in ("loud", "time"))]
+)
+def test_a_lost_column_of_a_table_of_a_protocol_is_restored_from_the_journal(path: Path, column: str) -> None:
+    copy = path.with_name("recovered.h5")
     with h5py.File(path, "r+") as file:
         # an unknown kind of column cannot be read
         file[f"entry/tones/{column}"].attrs["kind"] = "unknown"

@@ -98,7 +98,7 @@ def hold(written: Written, path: Path, counted: int) -> int:
     return found.rows
 
 
-@pytest.mark.parametrize("number", [8, pytest.param(200, marks=(pytest.mark.soak, pytest.mark.timeout(1200)))])
+@pytest.mark.parametrize("number", [5, pytest.param(200, marks=(pytest.mark.soak, pytest.mark.timeout(1200)))])
 def test_of_a_closed_file_cut_anywhere_the_beginning_is_kept(written: Written, tmp_path: Path, number: int) -> None:
     rng, whole = np.random.default_rng(number), len(written.closed)
     # one length in each of so many stretches, and where the file begins
@@ -110,28 +110,27 @@ def test_of_a_closed_file_cut_anywhere_the_beginning_is_kept(written: Written, t
     assert sum(found > 0 for found in rows) > number / 4
 
 
+# the first half of so small a file describes it
+@pytest.mark.parametrize("share", [5 / 6, pytest.param(2 / 3, marks=pytest.mark.soak)])
 def test_zeros_beyond_the_end_of_a_file_that_was_not_closed_are_not_taken_for_values(
-    written: Written, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    written: Written, tmp_path: Path, capsys: pytest.CaptureFixture[str], share: float
 ) -> None:
     """The tables are not packed: what is missing of them reads as 0, with no error."""
-    whole = len(written.left)
-    # the first half of so small a file describes it
-    for length in (2 * whole // 3, 5 * whole // 6):
-        path = cut_file(tmp_path, written.left, length)
-        assert any("truncated" in problem for problem in verify(path).problems)
-        assert main(["file", "info", str(path)]) == 2
-        assert "truncated" in capsys.readouterr().err
-        clean = tmp_path / f"{length} clean.h5"
-        assert main(["file", "recover", str(path), "--out", str(clean), "--json"]) == 0
-        told = json.loads(capsys.readouterr().out)
-        assert told["lost"]["samples"] == BLOCK * BLOCKS - told["samples"]
-        assert verify(clean).problems == ()
-        with open_datafile(clean) as record:
-            assert 0 < record.rows == told["samples"]
-            for name, values in kept_of(record).items():
-                np.testing.assert_array_equal(values, written.kept[name][: len(values)], err_msg=name)
-            assert record.status == "interrupted"
-            assert f"{told['lost']['samples']} rows of samples" in record.summary
+    path = cut_file(tmp_path, written.left, int(share * len(written.left)))
+    assert any("truncated" in problem for problem in verify(path).problems)
+    assert main(["file", "info", str(path)]) == 2
+    assert "truncated" in capsys.readouterr().err
+    clean = tmp_path / "clean.h5"
+    assert main(["file", "recover", str(path), "--out", str(clean), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["lost"]["samples"] == BLOCK * BLOCKS - told["samples"]
+    assert verify(clean).problems == ()
+    with open_datafile(clean) as record:
+        assert 0 < record.rows == told["samples"]
+        for name, values in kept_of(record).items():
+            np.testing.assert_array_equal(values, written.kept[name][: len(values)], err_msg=name)
+        assert record.status == "interrupted"
+        assert f"{told['lost']['samples']} rows of samples" in record.summary
 
 
 def test_points_come_back_from_the_journal_whatever_the_file_lost(written: Written, tmp_path: Path) -> None:

@@ -88,7 +88,7 @@ def test_a_living_file_can_be_read_and_grows(tmp_path: Path) -> None:
         assert process.stdout is not None
         rows, points = map(int, process.stdout.readline().split())
         with open_datafile(path) as record:
-            for _ in range(8):
+            for _ in range(4):
                 check(record, rows, points)
                 rows, points = map(int, process.stdout.readline().split())
                 record.refresh()

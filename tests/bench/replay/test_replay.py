@@ -4,6 +4,7 @@ import json
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 
 import h5py
@@ -127,7 +128,28 @@ def loopback() -> LoopbackRig:
     return rig
 
 
-def made(path: Path, do: Callable[[Mishap], None] | None = None, **person: bool) -> Path:
+ENDINGS: dict[str, tuple[Callable[[Mishap], None] | None, dict[str, bool]]] = {
+    "completed": (None, {}),
+    "stop": (lambda m: m.requests.stop(), {}),
+    "client lost": (lambda m: m.requests.stop("the window was closed", CauseCode.CLIENT_LOST), {}),
+    "abort": (lambda m: m.requests.abort(), {}),
+    "halt": (lambda m: m.requests.halt(), {}),
+    "declined": (None, {"declines": True}),
+    "stopped in a question": (None, {"stops": True}),
+    "emergency stop": (Mishap.open, {}),
+    "late": (Mishap.late, {}),
+    "error": (Mishap.fail, {}),
+}
+TIGHT = BENCH.model_copy(update={"limits": BENCH.limits.model_copy(update={"displacement": 0.005})})
+ALONE = {"alone": BENCH, "alone, with a tight limit": TIGHT}
+"""Runs without an operator, with no warning before."""
+
+
+def record_run(path: Path, ending: str) -> None:
+    if (bench := ALONE.get(ending)) is not None:
+        recorded(path, Two().plan(bench), loopback(), bench, Found)
+        return
+    do, person = ENDINGS[ending]
     rig, requests = loopback(), Requests()
     recorded(
         path,
@@ -140,57 +162,83 @@ def made(path: Path, do: Callable[[Mishap], None] | None = None, **person: bool)
         subscribers=[] if do is None else [Mishap(rig, requests, do)],
         first=[Warned("the stroke is nearly used up", time=0.0)],
     )
-    return path
 
 
-def played(path: Path) -> Replayed:
+@pytest.fixture(scope="module")
+def kept(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
+    """The data file of a run by its ending, recorded once: what changes it takes a copy."""
+    folder = tmp_path_factory.mktemp("kept")
+
+    @cache
+    def run(ending: str) -> Path:
+        path = folder / f"{ending}.h5"
+        record_run(path, ending)
+        return path
+
+    return run
+
+
+@pytest.fixture(scope="module")
+def again(kept: Callable[[str], Path]) -> Callable[[str], Replayed]:
+    """The replay of an unchanged run by its ending, carried out once."""
+    return cache(lambda ending: played(kept(ending)))
+
+
+@pytest.fixture
+def path(kept: Callable[[str], Path], tmp_path: Path) -> Path:
+    """A copy of the completed run."""
+    return copied(kept("completed"), tmp_path)
+
+
+def copied(path: Path, folder: Path) -> Path:
+    (folder / "run.h5").write_bytes(path.read_bytes())
+    return folder / "run.h5"
+
+
+def played(path: Path, bench: BenchConfiguration = BENCH) -> Replayed:
     before = path.read_bytes()
     with open_datafile(path) as record:
         configuration = stored_configuration(record)
-        assert configuration == BENCH
+        assert configuration == bench
         replayed = replay(record, Two().plan(configuration), configuration, clock=VirtualClock(), subscribers=[])
     assert path.read_bytes() == before
     return replayed
 
 
 @pytest.mark.parametrize(
-    ("do", "person", "status"),
+    ("ending", "status"),
     [
-        (None, {}, "completed"),
-        (lambda m: m.requests.stop(), {}, "stopped"),
-        (lambda m: m.requests.abort(), {}, "aborted"),
-        (lambda m: m.requests.halt(), {}, "halted"),
-        (None, {"declines": True}, "aborted"),
-        (None, {"stops": True}, "stopped"),
-        (Mishap.open, {}, "halted"),
+        ("completed", "completed"),
+        ("stop", "stopped"),
+        ("abort", "aborted"),
+        ("halt", "halted"),
+        ("declined", "aborted"),
+        ("stopped in a question", "stopped"),
+        ("emergency stop", "halted"),
     ],
-    ids=["completed", "stop", "abort", "halt", "declined", "stopped in a question", "emergency stop"],
 )
-def test_every_ending_comes_again(
-    tmp_path: Path, do: Callable[[Mishap], None] | None, person: dict[str, bool], status: str
-) -> None:
-    replayed = played(made(tmp_path / "run.h5", do, **person))
+def test_every_ending_comes_again(again: Callable[[str], Replayed], ending: str, status: str) -> None:
+    replayed = again(ending)
     assert replayed.found.differences == []
     assert replayed.identical
     assert (replayed.status, replayed.ended) == (status, None)
     assert replayed.played == replayed.rows > 1500
-    assert replayed.found.compared[POINTS] == len(replayed.points) == {"completed": 2}.get(status, bool(person))
+    points = {"completed": 2}.get(status, bool(ENDINGS[ending][1]))
+    assert replayed.found.compared[POINTS] == len(replayed.points) == points
     assert replayed.found.compared["estimates"] == len(replayed.points)
 
 
-def test_a_limit_that_was_exceeded_is_exceeded_again(tmp_path: Path) -> None:
-    limits = BENCH.limits.model_copy(update={"displacement": 0.005})
-    tight = BENCH.model_copy(update={"limits": limits})
-    ending = recorded(tmp_path / "run.h5", Two().plan(tight), loopback(), tight, Found)
-    with open_datafile(tmp_path / "run.h5") as record:
-        replayed = replay(record, Two().plan(tight), stored_configuration(record), clock=VirtualClock(), subscribers=[])
+def test_a_limit_that_was_exceeded_is_exceeded_again(kept: Callable[[str], Path]) -> None:
+    path = kept("alone, with a tight limit")
+    replayed = played(path, TIGHT)
     assert replayed.identical
-    assert (replayed.status, replayed.reason) == (ending.status, ending.reason)
-    assert "displacement" in ending.reason
+    with open_datafile(path) as record:
+        assert (replayed.status, replayed.reason) == (record.status, record.summary)
+        assert "displacement" in record.summary
 
 
-def test_blocks_that_came_late_are_in_no_sample_an_abort_stands_for_them(tmp_path: Path) -> None:
-    replayed = played(made(tmp_path / "run.h5", Mishap.late))
+def test_blocks_that_came_late_are_in_no_sample_an_abort_stands_for_them(again: Callable[[str], Replayed]) -> None:
+    replayed = again("late")
     assert replayed.found.differences == []
     (reason,) = replayed.in_place
     assert "delay of a block of samples 3 s exceeds" in reason
@@ -198,8 +246,7 @@ def test_blocks_that_came_late_are_in_no_sample_an_abort_stands_for_them(tmp_pat
     assert replayed.played == replayed.rows
 
 
-def test_the_clock_of_the_computer_is_no_part_of_the_replay(tmp_path: Path) -> None:
-    path = made(tmp_path / "run.h5")
+def test_the_clock_of_the_computer_is_no_part_of_the_replay(path: Path) -> None:
     with h5py.File(path, "r+") as file:
         times = file["entry/instrument/blocks/time"]
         # published after some work, as on a wall clock; the first block longest
@@ -208,16 +255,15 @@ def test_the_clock_of_the_computer_is_no_part_of_the_replay(tmp_path: Path) -> N
     assert played(path).identical
 
 
-def test_an_error_of_the_rig_is_where_the_recording_breaks_off(tmp_path: Path) -> None:
-    replayed = played(made(tmp_path / "run.h5", Mishap.fail))
+def test_an_error_of_the_rig_is_where_the_recording_breaks_off(again: Callable[[str], Replayed]) -> None:
+    replayed = again("error")
     assert replayed.identical
     assert replayed.ended is not None
     assert "sample 1700" in replayed.ended
     assert "no 100 samples came" in replayed.ended
 
 
-def test_a_killed_program_leaves_what_replays_up_to_there(tmp_path: Path) -> None:
-    path = made(tmp_path / "run.h5")
+def test_a_killed_program_leaves_what_replays_up_to_there(path: Path) -> None:
     with h5py.File(path, "r+") as file:
         entry = file["entry"]
         rows, time = 1637, 1.6
@@ -250,9 +296,8 @@ def _changed(path: Path, dataset: str, row: int, value: object) -> None:
     ],
 )
 def test_what_is_not_as_recorded_is_told(
-    tmp_path: Path, dataset: str, row: int, value: object, part: str, said: str
+    path: Path, dataset: str, row: int, value: object, part: str, said: str
 ) -> None:
-    path = made(tmp_path / "run.h5")
     _changed(path, dataset, row, value)
     replayed = played(path)
     assert not replayed.agrees
@@ -270,28 +315,20 @@ def _reworded(path: Path) -> None:
         entry["summary"][()] = b"in other words"
 
 
-@pytest.mark.parametrize(
-    ("do", "person"),
-    [
-        (None, {}),
-        (lambda m: m.requests.stop("the window was closed", CauseCode.CLIENT_LOST), {}),
-        (lambda m: m.requests.halt(), {}),
-        (None, {"declines": True}),
-        (None, {"stops": True}),
-        (Mishap.open, {}),
-        (Mishap.late, {}),
-        (Mishap.fail, {}),
-    ],
-    ids=["completed", "client lost", "halt", "declined", "stopped in a question", "emergency stop", "late", "error"],
-)
+REPLAYED = ("completed", "client lost", "halt", "declined", "stopped in a question", "emergency stop", "late", "error")
+
+
+@pytest.mark.parametrize("ending", REPLAYED)
 @pytest.mark.parametrize("reworded", [False, True])
 def test_a_file_replays_by_its_columns_whatever_the_wording(
-    tmp_path: Path, do: Callable[[Mishap], None] | None, person: dict[str, bool], reworded: bool
+    kept: Callable[[str], Path], again: Callable[[str], Replayed], tmp_path: Path, ending: str, reworded: bool
 ) -> None:
-    path = made(tmp_path / "run.h5", do, **person)
     if reworded:
+        path = copied(kept(ending), tmp_path)
         _reworded(path)
-    replayed = played(path)
+        replayed = played(path)
+    else:
+        replayed = again(ending)
     assert replayed.found.differences == []
     assert replayed.same_wording is not reworded
     assert replayed.found.compared[JOURNAL] > 7
@@ -312,16 +349,13 @@ def test_a_file_replays_by_its_columns_whatever_the_wording(
     ],
 )
 def test_a_changed_kind_or_number_is_found_in_a_file_of_another_wording(
-    tmp_path: Path, dataset: str, row: int, value: object, said: str
+    kept: Callable[[str], Path], tmp_path: Path, dataset: str, row: int, value: object, said: str
 ) -> None:
-    path, plan = tmp_path / "run.h5", Two().plan
-    limits = BENCH.limits.model_copy(update={"displacement": 0.005} if "limits" in dataset else {})
-    bench = BENCH.model_copy(update={"limits": limits})
-    recorded(path, plan(bench), loopback(), bench, Found)
+    ending = "alone, with a tight limit" if "limits" in dataset else "alone"
+    path = copied(kept(ending), tmp_path)
     _reworded(path)
     _changed(path, dataset, row, value)
-    with open_datafile(path) as record:
-        replayed = replay(record, plan(bench), bench, clock=VirtualClock(), subscribers=[])
+    replayed = played(path, ALONE[ending])
     assert any(said in each.text for each in replayed.found.differences), replayed.found.differences
     assert not replayed.agrees
 
@@ -354,8 +388,7 @@ def test_other_software_is_told_by_its_git_hash_where_the_versions_are_the_same(
     assert session._changed(software() | ({} if was is None else {"git": was})) == said
 
 
-def test_rounding_is_told_from_difference(tmp_path: Path) -> None:
-    path = made(tmp_path / "run.h5")
+def test_rounding_is_told_from_difference(path: Path) -> None:
     with h5py.File(path, "r") as file:
         peak, volts = file["entry/points/peak"][0], file["entry/instrument/drive/voltage"][1204]
     _changed(path, "points/peak", 0, np.nextafter(peak, 2.0))
@@ -366,8 +399,7 @@ def test_rounding_is_told_from_difference(tmp_path: Path) -> None:
     assert {each.part for each in replayed.found.differences} == {POINTS, DRIVE}
 
 
-def test_another_measurement_leads_to_another_drive_and_that_is_where_it_parts(tmp_path: Path) -> None:
-    path = made(tmp_path / "run.h5")
+def test_another_measurement_leads_to_another_drive_and_that_is_where_it_parts(path: Path) -> None:
     with h5py.File(path, "r+") as file:
         blocks = file["entry/instrument/blocks"]
         begin = int(blocks["row"][:][blocks["run"][:] == 2][0])
@@ -436,10 +468,9 @@ def test_a_difference_is_an_exit_code_and_a_line(
     assert "verdict was 'failed' and is 'passed'" in shown.err.splitlines()[-1]
 
 
-def test_what_cannot_be_played_is_refused_in_a_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["replay", str(tmp_path / "none.h5")]) == 2
+def test_what_cannot_be_played_is_refused_in_a_line(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["replay", str(path.with_name("none.h5"))]) == 2
     assert "there is no such file" in capsys.readouterr().err
-    path = made(tmp_path / "run.h5")
     assert main(["replay", str(path)]) == 2
     assert "protocol of the data file" in capsys.readouterr().err
     for speed in ("0", "fast", "-1", "nan"):

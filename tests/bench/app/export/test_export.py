@@ -348,7 +348,7 @@ def test_names_are_made_valid_and_stay_different() -> None:
     assert found == ["end_2", "a_b", "a_b_2", "time_2", "x_x", "x_", "n" * 63, "n" * 61 + "_2"]
 
 
-@pytest.mark.parametrize(("to", "piece"), [("csv", 2000), ("parquet", 8000)])
+@pytest.mark.parametrize(("to", "piece"), [("csv", 1000), ("parquet", 8000)])
 def test_memory_does_not_grow_with_the_run(
     tmp_path: Path, to: str, piece: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
