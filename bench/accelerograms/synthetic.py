@@ -3,8 +3,8 @@
 They consist of filtered shot noise; five of them also have a near-fault velocity pulse. The envelope is that of
 Saragoni and Hart (Earthquake Eng. Struct. Dyn. 2, 1974) with exponent 1, e(t) = c t exp(1 - c t). The filters are
 those of Kanai (1957) and Tajimi (1960), which models the ground as an oscillator, and of Clough and Penzien
-(Dynamics of Structures, 1975), a high-pass that brings velocity and displacement back to zero. The noise is modulated before
-filtering, as by Amin and Ang, J. Eng. Mech. Div. ASCE 94, 1968.
+(Dynamics of Structures, 1975), a high-pass that brings velocity and displacement back to zero. The noise is modulated
+before filtering, as by Amin and Ang, J. Eng. Mech. Div. ASCE 94, 1968.
 
 Peaks, durations and bands of six motions were measured on the records themselves. For Parkfield, the peak is the value
 in the record's database, and the pulse, ten inches of displacement within one and a half seconds, is that of Housner

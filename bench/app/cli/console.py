@@ -22,7 +22,7 @@ REDRAW_INTERVAL = 0.125
 
 
 class LiveConsole:
-    """A subscriber that displays the run on a terminal; a context manager that restores the terminal on exit.
+    """A subscriber that displays the run on a terminal, and a context manager that removes the display on exit.
 
     Events only update the display in memory. A separate thread redraws it after a change, so that the engine never
     waits for a terminal. With `person_answers`, the display is hidden while a question to the operator is open.

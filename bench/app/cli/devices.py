@@ -57,7 +57,7 @@ def devices(
     server = server if server is not None or hardware is None else hardware.daq.server
     daq = None if hardware is None else hardware.daq
     found, missing = _daq(server, None if daq is None else daq.tls, plain=daq is not None and daq.plain_connection)
-    progress("querying the serial ports, about 4 s")
+    progress("querying the serial ports")
     lasers, no_ports = _lasers(port or _configured(hardware))
     backends, failed = all_backends()
     content: dict[str, Any] = {

@@ -35,7 +35,7 @@ def info(file: CampaignFile, /, *, as_json: Json = False, progress: Handed = sil
 
 
 def verify(file: CampaignFile, /, *, as_json: Json = False, progress: Handed = silent) -> int:
-    """Check every dataset of a data file against its checksum and against the file layout.
+    """Check the datasets of a data file against their checksums and against the file layout.
 
     The exit code is 0 if the file is complete and unchanged, 2 if it is damaged or refused.
     """
@@ -84,8 +84,9 @@ def recover(
 ) -> int:
     """Rebuild a file after a crash or a full disk, or upgrade one of an older version.
 
-    The original is only read. Intact data are copied to a new file of the current layout with checksums; lost events
-    are restored from the journal next to the file. The exit code is 0, or 2 if the file is refused.
+    The original is only read. All readable data are copied to a new file of the current layout with checksums; lost
+    events are restored from the journal next to the file, if there is one. The exit code is 0, or 2 if the file is
+    refused.
     """
     progress("loading the program")
     from bench.datafile.recovery import recover as rebuild

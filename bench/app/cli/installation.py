@@ -1,4 +1,4 @@
-"""Commands for the installation: configuration files, benchmark, shell completion."""
+"""Commands for the installation: configuration files, benchmark and shell completion."""
 
 from datetime import datetime
 from pathlib import Path
