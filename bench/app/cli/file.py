@@ -137,8 +137,8 @@ def export(
 ) -> int:
     """Write a recorded campaign for other programs: every channel and the drive, and the tables of results.
 
-    Writes one file per run; names and units are kept, and missing samples are NaN. Every dataset is compared with its
-    checksum; damaged ones are reported and listed in the file DAMAGED.txt of the folder. The exit code is 0 if
+    Writes one file per run; names and units are kept, and missing samples are NaN. Datasets are compared with their
+    checksums; damaged ones are reported and listed in the file DAMAGED.txt of the folder. The exit code is 0 if
     everything was written, 1 if the disk failed, 2 if an input was refused, 130 after Ctrl-C; no partial files remain.
     """
     progress("loading the program")

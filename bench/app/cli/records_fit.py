@@ -45,7 +45,7 @@ def _fit(
     as_json: Json = False,
     progress: Handed = silent,
 ) -> int:
-    """Fit a record to the stroke and the velocity of the configured bench, starting and ending at rest.
+    """Fit a record to the stroke and the velocity of the configured bench, with rest at its beginning and end.
 
     The record is scaled in time (--length-ratio), trimmed, limited to a band, scaled to a peak, then fitted: by the
     least change below 2 Hz, by a high-pass filter, or by both for comparison. Stroke, velocity and the change of the

@@ -39,9 +39,9 @@ def report(
 ) -> int:
     """Create a report of a campaign from its data file.
 
-    One self-contained page: test and specimen, figures like the paper's Figs. 3 to 9 from this file's data, tables with
-    uncertainties, comparison with the prediction, limits and warnings, provenance. Every dataset is compared with its
-    checksum first; damaged ones are listed at the top of the report. Without --html and --pdf, the report is written as
+    One self-contained document with the test and the specimen, figures and tables with uncertainties, a comparison with
+    the prediction if there is one, limits, warnings, and provenance. The datasets are compared with their checksums
+    first; damaged ones are listed at the top of the report. Without --html and --pdf, the report is written as
     HTML next to FILE, with the extension .report.html. The exit code is 0 if it was written, 1 if it could not be
     written, 2 if an input was refused. Existing files are kept unless --overwrite is given.
     """
