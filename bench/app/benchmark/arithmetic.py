@@ -34,7 +34,7 @@ ROUNDS = 200_000
 
 
 class Counted:
-    """A number whose sums, differences, products, quotients and roots are counted; a fused multiply-add counts as two.
+    """A number whose sums, differences, products, quotients and roots are counted; a fused multiply-add counts twice.
 
     The sine and the cosine are not counted.
     """

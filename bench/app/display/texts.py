@@ -334,14 +334,14 @@ FOUND = "Result of the last search."
 FIND_FAILED = "The search for devices failed: {text}"
 CHECK_LOOP = "Check the loop"
 CHECK_LOOP_TIP = (
-    "Records at rest, then drives low-level sines with the frame locked to the table: checks polarity, scale and "
-    "delay of every sensor, and the drive. Same as `rockbench check` (Ctrl+L)."
+    "Records the signals at rest, then drives low-level sines with the frame locked to the table: checks polarity, scale "
+    "and delay of the sensors, and the drive. Same as `rockbench check` (Ctrl+L)."
 )
 CHECK_LOOP_IDLE = "No check since the window was opened."
 CHECK_LOOP_RUNNING = "In progress; questions appear above."
 CHECK_LOOP_ENDED = "{passed} passed, {failed} failed, {other} without verdict. {how}"
 CHECK_IN = "Results are in {out}."
-CHECK_CUT = "The check was interrupted."
+CHECK_CUT = "The check was not completed."
 CHECK_TABLE_TIP = "The tooltip of a failed line gives the remedy."
 ASK_CHECK_TIP = "On this bench, the frame is clamped and unclamped by hand, so the check always asks the operator."
 CHECK_TITLES = ("verdict", "signal", "quantity", "measured", "U (k = 2)", "allowed")

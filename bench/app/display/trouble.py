@@ -1,4 +1,4 @@
-"""Fault reports for the operator: event, reaction of the bench, next step."""
+"""Fault reports for the operator: event, reaction of the bench and next step."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""Background work: functions in a thread or in the reading process, commands in a separate process."""
+"""Background work: functions in a thread or in the reading process, and commands in a separate process."""
 
 import shutil
 import subprocess

@@ -58,7 +58,7 @@ class Controller(QObject):
     plan_checked = Signal(object, object)
     """Emits the result of `check_plan`, a `PlanChecked` or a `Refused`, and the object that requested it."""
     began = Signal(object)
-    """Emits the `Run` that was just started."""
+    """Emits the `Run` that was just started, or to which the window was just attached."""
     ended = Signal(object)
     """Emits the end of the run: an `Ended` or a `Refused`."""
     _message_received = Signal()
