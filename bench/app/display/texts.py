@@ -334,8 +334,8 @@ FOUND = "Result of the last search."
 FIND_FAILED = "The search for devices failed: {text}"
 CHECK_LOOP = "Check the loop"
 CHECK_LOOP_TIP = (
-    "Records the signals at rest, then drives low-level sines with the frame locked to the table: checks polarity, scale "
-    "and delay of the sensors, and the drive. Same as `rockbench check` (Ctrl+L)."
+    "Records the signals at rest, then drives low-level sines with the frame locked to the table: checks polarity, "
+    "scale and delay of the sensors, and the drive. Same as `rockbench check` (Ctrl+L)."
 )
 CHECK_LOOP_IDLE = "No check since the window was opened."
 CHECK_LOOP_RUNNING = "In progress; questions appear above."
