@@ -243,7 +243,7 @@ class SpecimenOptions:
         Parameter(
             metavar="NUMBER",
             help="Free length d of the coupling spring [m] (above 0).",
-            show_default="the specimen's; the paper's is 0.1 m",
+            show_default="the specimen's, 0.1 m",
         ),
     ] = None
     restitution_factor: Annotated[
@@ -251,7 +251,7 @@ class SpecimenOptions:
         Parameter(
             metavar="NUMBER",
             help="Ratio of the block's restitution to the theoretical one (at least 0).",
-            show_default="the specimen's; the paper's is 1",
+            show_default="the specimen's, 1",
         ),
     ] = None
 

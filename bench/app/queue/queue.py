@@ -28,7 +28,7 @@ class Stage(StrEnum):
     RUNNING = "running"
     DONE = "done"
     FAILED = "failed"
-    """The test was refused or did not complete."""
+    """The test was refused, did not complete, or did not pass."""
     SKIPPED = "skipped"
 
 
@@ -125,8 +125,8 @@ class Queue:
         self._change([*self._tests[:index], *self._tests[index + 1 :]])
 
     def move(self, index: int, by: int) -> int:
-        """Move a pending test down by `by` places (up if negative), at most to the end of the list; returns its new
-        index.
+        """Move a test that has not begun down by `by` places (up if negative), at most to the end of the list; returns
+        its new index.
         """
         test = self._open(index, "moved")
         rest = [*self._tests[:index], *self._tests[index + 1 :]]
