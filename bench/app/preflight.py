@@ -39,7 +39,7 @@ RAW_BYTES = 6
 
 @dataclass(frozen=True)
 class DiskSpace:
-    """Bytes that the data file may need, uncompressed, and bytes that are free in its `folder`."""
+    """Bytes that the data file may need, and bytes that are free on the disk of its `folder`."""
 
     folder: Path
     needed: int

@@ -134,7 +134,7 @@ _WIDE = 100
 _NUMBERS = ("omega\n[rad/s]", "beta", "alpha_2\n(k = 2)", "predicted", "off by")
 _WORDS = ("agrees", "status", "measured over")
 _AROUND_TABLE = 11 + NOTICES
-"""Number of lines of the display without the rows of the table."""
+"""Number of lines of the display other than the rows of the table and the live values."""
 
 
 def draw(scene: RunDisplay, width: int, height: int) -> RenderableType:
@@ -151,7 +151,7 @@ def draw(scene: RunDisplay, width: int, height: int) -> RenderableType:
 
 
 def log_line(notice: Notice) -> Text:
-    """One line of the log: time, kind, text."""
+    """One line of the log: time, kind and text."""
     return Text.assemble(
         (f"{clock(notice.time):>8}  ", "dim"),
         (f"{notice.kind:<8} ", "bold red" if notice.grave else "bold"),

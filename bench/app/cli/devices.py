@@ -46,7 +46,7 @@ def devices(
     """List the NI devices with their channels and ranges, the lasers on the serial ports, and the rig backends.
 
     Each port is queried at every baud rate; specify the ports if other instruments must not be disturbed. The exit code
-    is 0, even if nothing is found, or 2 if an argument is refused.
+    is 0, even if nothing is found, or 2 if an argument or the configuration is refused.
     """
     progress("searching for NI devices")
     if server is not None:

@@ -1,4 +1,4 @@
-"""Commands on data files: `rockbench file info`, `verify` and `recover`, and `rockbench export`."""
+"""Commands for data files: `rockbench file info`, `verify` and `recover`, and `rockbench export`."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal

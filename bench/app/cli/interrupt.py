@@ -213,7 +213,7 @@ def handle_signals(interrupts: Interrupts) -> None:
 
 
 def interrupted_text(text: str = "interrupted", otherwise: str = "") -> str:
-    """Message for an interrupt: `text` with the files that are complete, or with `otherwise` if there are none."""
+    """Message for an interrupt: `text` and the complete result files or, if there are none, `otherwise`."""
     kept = ", ".join(map(str, completed()))
     if not kept:
         return f"{text}; {otherwise}" if otherwise else text

@@ -1,4 +1,4 @@
-"""Predictions under a sine, with their tables, texts and figures: modes, histories, steady motions, spectra and maps."""
+"""Predictions under a sine, with tables, texts and figures: modes, histories, steady motions, spectra and maps."""
 
 import sys
 from collections.abc import Callable, Sequence

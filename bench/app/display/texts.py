@@ -55,7 +55,7 @@ CLEAR_BUSY = "The stopped run is still under way."
 ELAPSED, REMAINING, OWNER, STEP, INPUTS = "elapsed", "remaining", "run", "step", "safety inputs"
 NO_INPUTS = "none configured"
 INPUT_GOOD, INPUT_OPEN, INPUT_UNKNOWN = "good", "OPEN", "unknown"
-INPUTS_UNREAD = "read only during a run"
+INPUTS_UNREAD = "not read outside a run"
 INPUTS_TIP = (
     "Configured inputs, such as auxiliary contacts of the emergency stop, over-travel switches or amplifier. They are "
     "read twice a second during a run, and shown as unknown after {stale:g} s without a reading."
@@ -105,7 +105,7 @@ DECLINE_TIP = "Reports that the task is not done and ends the run (Ctrl+Shift+Ba
 PROMPT = "Operator task"
 PROMPT_PARTS = ("Why", "Checked afterwards")
 LEAVE_WINDOW, STAY = "Close the window", "Stay"
-LEAVE_RAMPS_OUT = "This window controls a run. If you close it, the output ramps out and the run ends."
+LEAVE_RAMPS_OUT = "This window controls a run. If you close the window, the output ramps out and the run ends."
 LEAVE_GOES_ON = "A run is under way. It continues without this window; a window opened later can stop it."
 
 RAMP_OUT = "Ramp out, keep data"
@@ -122,7 +122,7 @@ SECONDS = "seconds before now"
 ALPHA, PREDICTED, DIFFERENCE = "α₂", "predicted", "difference {off}"
 TWIN = "live model"
 MODULATED = "hollow: modulated motion"
-OTHER_AXIS = "{name}: not drawn, needs another axis"
+OTHER_AXIS = "{name}: not drawn; it needs another axis"
 BARE_SINE, BARE_RECORD = "ω = {omega:g} rad/s, bare frame", "{record}, bare frame"
 MEASURING, LAST_POINT = "measuring {point}", "last point, {status}: {point}"
 BAND = "Shaded: band due to the uncertainty of the specimen's parameters (k = 2), where the motion is stable."
@@ -137,7 +137,8 @@ NO_CHANGE = "< 0.01 %"
 SENSORS = ("table acceler.", "table displ.", "laser 1", "laser 2")
 STEADY_TIP = (
     "For each sensor, the mean cycles of two windows of {window} cycles are compared; steady means that they agree "
-    "within a third of {tolerance:g} % (settle tolerance).\n"
+    "within a third of {tolerance:g} % (settle tolerance) and that the cycles of the second window scatter by at most "
+    "five times this tolerance.\n"
     "○ too few cycles, ◐ settling, ● steady, ◆ cycles that differ but repeat as a group; the number is the change "
     "between the two windows.\n"
     "Computed from the displayed traces, for information: the run ends a dwell by the same criterion, applied to the "
@@ -206,7 +207,7 @@ RUN_ITEM = "run {number}, {seconds:.0f} s"
 SINCE_ARMED = "seconds since the rig was armed"
 REPORT, EXPORT = "Create report", "Export"
 REPORT_TIP = (
-    "Runs `rockbench report` on the selected file and writes to the same folder; at low priority, also during a run."
+    "Runs `rockbench report` on the selected file at low priority, also during a run, and writes to the same folder."
 )
 EXPORT_TIP = "Runs `rockbench export` on the selected file and writes to a new folder next to it."
 MAKING, MADE, NOT_MADE = "Creating {path} …", "Created: {path}", "No file was written. {text}"
@@ -262,7 +263,7 @@ USE_BACK = "Configured values"
 USE_BACK_TIP = "Uses the values of the configuration again for all following runs (Ctrl+Shift+U)."
 USED = 'Runs now use {files}. "Configured values" undoes this.'
 FURTHER, FURTHER_TIP = "and …", "Adds channels: in the plot of the first channel or, for another unit, below it."
-OVERLAY, OVERLAY_TIP = "ticked runs", "Also draws the same channels and run of the other ticked files."
+OVERLAY, OVERLAY_TIP = "ticked runs", "Also draws the same channels and the same run of the other ticked files."
 CURSORS = "cursors"
 CURSORS_TIP = (
     "Shows two cursors, A and B, to drag; the line below gives the samples at both. While the plot has the focus, the "
@@ -303,7 +304,7 @@ CONFIGURATION = "Configuration"
 VIRTUAL_SHORT = "simulated bench"
 VIRTUAL = "the simulated bench with the paper's specimen (no configuration file was given)"
 
-OWN_ERROR = "error in the window, not in the bench: {error}. The run continues; details are in the terminal."
+OWN_ERROR = "error in the window, not in the bench: {error}. A run under way continues; details are in the terminal."
 
 
 TROUBLE, TROUBLE_DETAILS, TROUBLE_CLOSE = "Needs attention", "Details", "Hide"
@@ -325,7 +326,7 @@ CONFIGURATION_KEPT = "{text}. The current configuration stays in use."
 MUST_BE = "It must be {allowed}."
 FIND = "Search for devices"
 FIND_TIP = (
-    "Queries NI's driver or server and every serial port, like `rockbench devices`; takes a few seconds (Ctrl+D)."
+    "Queries NI's driver or server and the serial ports, like `rockbench devices`; takes a few seconds (Ctrl+D)."
 )
 FIND_EMPTY = "No search yet."
 FIND_SIMULATED = "The simulated bench has no devices. You can still search for the devices of this computer."

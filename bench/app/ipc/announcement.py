@@ -1,4 +1,4 @@
-"""Announcement of a session to the windows on this computer, and the listener through which they attach."""
+"""Announcement of a session to clients on this computer, and the listener through which they attach."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""The session's side of the connection: sends events and traces, handles requests, and detects the loss of the client."""
+"""The session's side of the connection: sends events and traces, handles requests and detects a lost client."""
 
 import signal
 import threading
