@@ -145,7 +145,7 @@ class BenchConfiguration(Parameters):
 
     @property
     def table_band(self) -> tuple[float, float]:
-        """The table's usable band [Hz], to which records are filtered before scaling."""
+        """The table's usable band [Hz], to which records can be limited before scaling."""
         return self.settings.band_low, self.settings.band_high
 
     @property
@@ -207,7 +207,7 @@ class BenchConfiguration(Parameters):
     @field_validator("backend")
     @classmethod
     def _installed_backend(cls, name: str) -> str:
-        # built-in backends are loaded only when a rig is opened
+        # validation does not load the built-in backends
         if name not in _TABLES:
             try:
                 load_backend(name)

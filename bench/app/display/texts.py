@@ -325,9 +325,7 @@ IDENTIFIED = "{kind}: {path}"
 CONFIGURATION_KEPT = "{text}. The current configuration stays in use."
 MUST_BE = "It must be {allowed}."
 FIND = "Search for devices"
-FIND_TIP = (
-    "Queries NI's driver or server and the serial ports, like `rockbench devices`; takes a few seconds (Ctrl+D)."
-)
+FIND_TIP = "Queries NI's driver or server and the serial ports, like `rockbench devices`; takes a few seconds (Ctrl+D)."
 FIND_EMPTY = "No search yet."
 FIND_SIMULATED = "The simulated bench has no devices. You can still search for the devices of this computer."
 FINDING = "Searching …"

@@ -206,7 +206,7 @@ def queued(protocol: "Protocol[Any]", parameters: Parameters, out: Path | None, 
 
 
 def ready(test: Queued, number: int, configuration: "BenchConfiguration") -> Ready:
-    """Check the parameters of a test against the bench, and its folder. Raises InvalidInput that names the test."""
+    """Check a test: its parameters against the bench, and its folder. Raises InvalidInput that names the test."""
     try:
         protocol = load_protocol(test.protocol)
         parameters = validated(protocol.parameters, test.parameters, dotted)
@@ -219,8 +219,8 @@ def ready(test: Queued, number: int, configuration: "BenchConfiguration") -> Rea
 
 
 def all_ready(tests: Sequence[Queued], configuration: "BenchConfiguration") -> Mapping[int, Ready]:
-    """All pending tests, checked, by index. Raises InvalidInput for the first that cannot run, and for a folder used by
-    two tests.
+    """Check all pending tests; returns them by index. Raises InvalidInput for the first that cannot run, and for a
+    folder used by two tests.
     """
     found: dict[int, Ready] = {}
     folders: dict[Path, int] = {}

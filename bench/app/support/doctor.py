@@ -26,7 +26,8 @@ SPEED = 20e6
 ROOM = 5e9
 """Smallest acceptable free space [B]."""
 LATENCY = 1
-"""Largest acceptable latency timer of a serial adapter [ms]; the default of 16 ms delays the readings of a laser."""
+"""Largest acceptable latency timer of a serial adapter [ms]; the usual default, 16 ms, delays the readings of a laser.
+"""
 
 
 class Health(StrEnum):
@@ -74,7 +75,7 @@ def examine(folder: Path, port: str | None = None) -> Iterator[Finding]:
 
 
 def versions() -> Finding:
-    """Check the version of Python, which must have 64 bits; the finding also lists the versions of the libraries."""
+    """Check that Python is recent and has 64 bits; the finding also lists the versions of the libraries."""
     versions = ", ".join(f"{name} {version}" for name, version in software().items())
     good = sys.version_info[:2] >= OLDEST and sys.maxsize > 2**32
     remedy = "" if good else f"install a 64-bit Python, {OLDEST[0]}.{OLDEST[1]} or newer"
