@@ -1,6 +1,6 @@
 """Intensity measures of a record: peaks of acceleration, velocity and displacement, energy and duration.
 
-The samples are interpolated linearly, as everywhere in this software, and the motion starts from rest. Since no
+The samples are interpolated linearly, as in the predictions, and the motion starts from rest. Since no
 baseline correction or filter is applied, the final velocity and displacement show the record's drift.
 """
 

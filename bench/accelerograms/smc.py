@@ -73,7 +73,8 @@ def _comments(text: RecordText) -> int:
     word = _field(text, _TEXT, 16).strip()
     if re.fullmatch(r"\d+", word) is None:
         raise text.refusal(
-            _TEXT + 1, "its last number, that of comment lines, must be an integer from 0; download the file again"
+            _TEXT + 1,
+            "its last number, that of comment lines, must be an integer of at least 0; download the file again",
         )
     return int(word)
 

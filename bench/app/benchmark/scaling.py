@@ -126,7 +126,7 @@ def startup(warm_runs: int) -> Section:
         "On a machine under other load, processor time is more meaningful than elapsed time. A helper process compiles "
         "a part of the kernel at the same time.",
         "About half of the compilation time is spent on the function that advances many members, which is compiled "
-        "last; most of it on the compiler's analysis in Python, not on the optimisation of machine code.",
+        "last. Compilation is mostly the compiler's analysis in Python, not the optimisation of machine code.",
     )
     targets = (
         Target("compilation for predict steady", 4.0, cold - warm, "s"),

@@ -228,7 +228,7 @@ seismic = _under_records(
     "Gain curves under earthquake records: alpha_1 and alpha_2 against the stiffness.\n\nEach record is trimmed, "
     "limited to the table's band, if any, scaled to the peak --peak-factor, and on request fitted to the stroke; "
     "motions start at rest. For a block that topples, the time of toppling is given instead of a gain. The figure is "
-    "like the paper's Fig. 8(a) and 9(a).",
+    "like the paper's Figs. 8(a) and 9(a).",
     drawable=28,
 )
 band_study = _under_records(

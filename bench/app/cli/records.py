@@ -86,7 +86,7 @@ def info(
 
 
 def _content(record: "Accelerogram") -> dict[str, Any]:
-    """Content of a record for JSON, in SI units, which the keys state at their end."""
+    """Content of a record for JSON, in the SI units stated at the end of the keys."""
     from bench.accelerograms.measures import measures
 
     found = measures(record)

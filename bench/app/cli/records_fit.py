@@ -80,7 +80,7 @@ fit = with_flags(StrokeFitRequest, "Parameters of fit", _fit)
 
 
 def _content(fits: "StrokeFits") -> dict[str, Any]:
-    """Content of the fits for JSON, in SI units, which the keys state at their end."""
+    """Content of the fits for JSON, in the SI units stated at the end of the keys."""
     record = fits.record
     first = fits.chosen.fit
     return {
