@@ -45,8 +45,8 @@ class Line:
 
 
 class SamplePlot(pg.GraphicsLayoutWidget):
-    """Lines with a common horizontal axis, in stacked plots, one for each unit; the wheel zooms, and dragging pans. Keys
-    select a cursor and move it from sample to sample.
+    """Lines with a common horizontal axis, in stacked plots, one for each unit; the wheel zooms, and dragging pans.
+    Keys select a cursor and move it from sample to sample.
     """
 
     range_changed = Signal()
