@@ -1,4 +1,4 @@
-"""Limits of size and nesting depth for text files: configurations, records, specimens, queues."""
+"""Limits of size and nesting depth for text files: configurations, records, specimens and queues."""
 
 from pathlib import Path
 from typing import Any, cast

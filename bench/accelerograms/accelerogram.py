@@ -1,4 +1,4 @@
-"""One horizontal component of a ground motion, unprocessed."""
+"""One component of a ground motion."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -15,10 +15,11 @@ Array = NDArray[np.float64]
 class Accelerogram:
     """Ground acceleration [m/s2], shape (n,), at a constant step `dt` [s].
 
-    The samples are not filtered, scaled or shifted, except that the offset of K-NET and KiK-net recorders is removed;
-    `header` then states this offset. `name` is a short name for tables and legends. `source` is the path of the file,
-    or a note that the motion is synthetic; `format` is the file format, `unit` the unit in the file, `sha256` the hash
-    of the file's bytes (of the samples for a synthetic motion). `header` holds the source's header values by name.
+    The samples of a file are converted to m/s2 and otherwise unchanged, except that the mean of a K-NET or KiK-net
+    record is subtracted; `header` then states this offset. `name` is a short name for tables and legends. `source` is
+    the path of the file, or a note that the motion is synthetic; `format` is the file format, `unit` the unit in the
+    file, `sha256` the hash of the file's bytes (of the rounded samples for a synthetic motion). `header` contains the
+    header's values or lines by name.
     """
 
     name: str

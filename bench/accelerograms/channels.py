@@ -11,8 +11,8 @@ from sim.errors import InvalidInput
 
 @dataclass(frozen=True)
 class Channel:
-    """Channel of a file, by line indices: its header begins at `first`; its samples follow line `data` and end before
-    `last`.
+    """Channel of a file and its line indices: the header begins at `first`; the samples follow line `data` and end
+    before `last`.
     """
 
     number: int

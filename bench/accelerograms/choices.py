@@ -43,7 +43,7 @@ class Reading:
 
 
 def refuse_choice(text: RecordText, choices: Choices, *names: str) -> None:
-    """Raise InvalidInput if a choice of `names` ("channel", "column") is set, because the file's format has none."""
+    """Raise InvalidInput if a choice of `names` ("channel", "column"), which the format does not allow, is set."""
     remedies = {
         "channel": "this format has no channels",
         "column": "a column can be selected only in a file of plain columns",

@@ -1,8 +1,9 @@
 """Plain columns separated by commas, semicolons, tabs or blanks: `t,a`, `a`, or several components.
 
-They may follow comments, lines that begin with % or #, and one line of headings like `t [s], NS [cm/s2]`. A first
-column that rises throughout is the time [s] and determines the step. Nothing else is inferred: comments are kept as the
-header; the unit, the step of columns without time and the column among several must be specified.
+Comments (lines that begin with % or #) and one line of headings like `t [s], NS [cm/s2]` may precede them. A first
+column that rises steadily is the time [s] and determines the step. Nothing else is inferred: the unit if no heading
+states it, the step if there is no time, and one of several columns must be specified. Comments are kept as the header;
+a step or unit in them must not contradict the specified one.
 """
 
 import re
@@ -42,7 +43,7 @@ def check_comments(text: RecordText, count: int, choices: Choices) -> None:
 _COMMENT = ("%", "#")
 _HEADING = re.compile(r"^(?P<name>.*?)\s*[\[(]\s*(?P<unit>[^\])]+?)\s*[\])]\s*$")
 _RISING = 0.9
-"""Fraction of rising steps above which the first column counts as time; its steps must then all be equal."""
+"""Fraction of rising steps from which the first column counts as time; its steps must then all be equal."""
 
 _EQUAL = 1e-6
 """Relative tolerance for rounding errors in the comparison of time steps."""
@@ -59,7 +60,7 @@ class _Table:
 
 
 def recognise(text: RecordText) -> bool:
-    """Whether the file consists of comments, at most one line of headings, and numbers."""
+    """Whether the file begins with comments, if any, at most one line of headings, and a row of numbers."""
     first = _first_row(text)
     return first is not None and first - _comments(text) <= 1
 
@@ -169,7 +170,7 @@ def _step(text: RecordText, table: _Table) -> float:
     drift = np.abs(time - time[0] - dt * np.arange(time.size))
     if wrong.size or drift.max() > max(rounding, _EQUAL * usual):
         at = int(wrong[0]) + 1 if wrong.size else int(drift.argmax())
-        problem = f"the step from the previous time differs from the usual step, {usual:g} s"
+        problem = f"the times up to this one do not have a constant step of {usual:g} s"
         raise text.refusal(table.first + at, f"{problem}: there is a gap, or the times have too few digits")
     # restore the intended step: 0.01 instead of 0.00999999999
     meant = float(f"{dt:.9g}")

@@ -84,7 +84,7 @@ def _step(text: RecordText, channel: Channel) -> float:
             values = numbers(text, index + 1, index + 1 + int(reals[2]), int(reals[1]), int(reals[3])).values
             if values.size >= _STEP and values[_STEP - 1] > 0.0:
                 return float(values[_STEP - 1])
-            raise text.refusal(index, f"real number {_STEP}, the time step, is unknown")
+            raise text.refusal(index, f"real number {_STEP}, the time step, is missing or not positive")
     raise text.refusal(
         channel.first, "the real numbers, which include the time step, are missing; download the file again"
     )

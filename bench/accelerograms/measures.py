@@ -1,6 +1,6 @@
 """Intensity measures of a record: peaks of acceleration, velocity and displacement, energy and duration.
 
-The samples are interpolated linearly, as everywhere in this software, and the motion starts from rest. Since no
+The samples are interpolated linearly, as in the predictions, and the motion starts from rest. Since no
 baseline correction or filter is applied, the final velocity and displacement show the record's drift.
 """
 
@@ -18,7 +18,7 @@ from bench.analysis.table_motion import table_motion
 Array = NDArray[np.float64]
 
 DRIFTING = 0.05
-"""Ratio of final to peak velocity above which drift dominates a record's velocity and displacement."""
+"""Ratio of final to peak velocity above which a record counts as drifting."""
 
 
 @dataclass(frozen=True)
@@ -26,10 +26,10 @@ class Measures:
     """Measures of one component.
 
     `pga` [m/s2], `pgv` [m/s] and `pgd` [m] are the largest magnitudes, including those between samples;
-    `final_velocity` [m/s] and `final_displacement` [m] are those at the last sample. `arias` [m/s] is the intensity of
-    Arias (1970), pi / (2 g) times the integral of a^2. `significant_5_75` and `significant_5_95` [s] are the times in
-    which it grows from 5 to 75 % and from 5 to 95 % of its final value (Trifunac and Brady, Bull. Seism. Soc. Am. 65,
-    1975).
+    `final_velocity` [m/s] and `final_displacement` [m] are the values at the last sample. `arias` [m/s] is the
+    intensity of Arias (1970), pi / (2 g) times the integral of a^2. `significant_5_75` and `significant_5_95` [s] are
+    the times in which it grows from 5 to 75 % and from 5 to 95 % of its final value (Trifunac and Brady, Bull. Seism.
+    Soc. Am. 65, 1975).
     """
 
     pga: float
@@ -43,7 +43,7 @@ class Measures:
 
     @property
     def drifts(self) -> bool:
-        """Whether `pgv` and `pgd` are due to a baseline error rather than to ground motion."""
+        """Whether the final velocity exceeds `DRIFTING` times `pgv`, which indicates a baseline error."""
         return abs(self.final_velocity) > DRIFTING * self.pgv
 
 

@@ -1,4 +1,4 @@
-"""Reader of earthquake records in all common formats."""
+"""Reader of earthquake records; detects the file format."""
 
 from collections.abc import Callable
 from pathlib import Path

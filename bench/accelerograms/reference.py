@@ -97,7 +97,7 @@ class RecordReference:
 
 
 def read_records(references: Sequence[RecordReference]) -> tuple[Accelerogram, ...]:
-    """Read all records of a campaign before it starts. Raises InvalidInput if two share a name."""
+    """Read all records of a campaign. Raises InvalidInput if one cannot be read or two share a name."""
     records: list[Accelerogram] = []
     owners: dict[str, str] = {}
     for reference in references:

@@ -1,8 +1,8 @@
 """U.S. Geological Survey `.smc` files: 11 lines of text, 48 integers, 50 reals, comments, then samples in cm/s2.
 
 Integer 16 is the number of comment lines, integer 17 that of samples; real 2 is the sampling rate [Hz], reals 30 and 32
-are the largest and the smallest sample. Columns are 10 characters wide and may touch. Source: USGS National
-Strong-Motion Program, "SMC-format data files", sections 3 and 4.
+are the largest and the smallest sample. Columns are 10 characters wide (15 for the reals) and may touch. Source: USGS
+National Strong-Motion Program, "SMC-format data files", sections 3 and 4.
 """
 
 import re
@@ -13,7 +13,7 @@ from bench.accelerograms.stated import check_peak, count_in, not_acceleration
 from bench.accelerograms.text import RecordText
 
 _TEXT, _INTEGERS, _REALS, _COMMENTS = 11, 17, 27, 27
-"""Numbers of lines up to the end of the text, of the integers and of the reals, which the comments follow."""
+"""Line indices at which the text, the integers and the reals end and the comments begin."""
 
 _WIDTH, _REAL_WIDTH = 10, 15
 _TYPE = re.compile(r"^\s*([0-6])\s+([A-Z][A-Z ]+)")
@@ -73,7 +73,8 @@ def _comments(text: RecordText) -> int:
     word = _field(text, _TEXT, 16).strip()
     if re.fullmatch(r"\d+", word) is None:
         raise text.refusal(
-            _TEXT + 1, "its last number, the number of comment lines, must not be negative; download the file again"
+            _TEXT + 1,
+            "its last number, that of comment lines, must be an integer of at least 0; download the file again",
         )
     return int(word)
 

@@ -1,16 +1,16 @@
 """Synthetic ground motions with the main parameters of the paper's seven records, for use without record files.
 
-They consist of filtered shot noise and a near-fault velocity pulse. The envelope of the noise is that of Saragoni and
-Hart (Earthquake Eng. Struct. Dyn. 2, 1974) with an exponent of 1, e(t) = c t exp(1 - c t). The filters are that of
-Kanai (1957) and Tajimi (1960), which models the ground as an oscillator, and the high-pass of Clough and Penzien
-(Dynamics of Structures, 1975), which brings velocity and displacement back to zero. The noise is modulated before
-filtering, as by Amin and Ang, J. Eng. Mech. Div. ASCE 94, 1968.
+They consist of filtered shot noise; five of them also have a near-fault velocity pulse. The envelope is that of
+Saragoni and Hart (Earthquake Eng. Struct. Dyn. 2, 1974) with exponent 1, e(t) = c t exp(1 - c t). The filters are
+those of Kanai (1957) and Tajimi (1960), which models the ground as an oscillator, and of Clough and Penzien
+(Dynamics of Structures, 1975), a high-pass that brings velocity and displacement back to zero. The noise is modulated
+before filtering, as by Amin and Ang, J. Eng. Mech. Div. ASCE 94, 1968.
 
 Peaks, durations and bands of six motions were measured on the records themselves. For Parkfield, the peak is the value
 in the record's database, and the pulse, ten inches of displacement within one and a half seconds, is that of Housner
 and Trifunac (Bull. Seism. Soc. Am. 57, 1967); its duration and band are estimates. Periods and amplitudes of the other
 pulses were chosen by eye from the velocity pulses of the records, not fitted. Filter frequencies and noise durations
-were adjusted so that the means over many seeds equal the declared values.
+were adjusted so that the means over many seeds agree with the declared values.
 """
 
 from dataclasses import dataclass
@@ -133,8 +133,8 @@ FADING = 1.5
 def synthetic_record(name: str, seed: int = DEFAULT_SEED) -> Accelerogram:
     """A synthetic ground motion with the main parameters of the record `name`, one of NAMES.
 
-    The peak is exact; the means of duration and band over many seeds equal the declared values. The motion begins and
-    ends at rest, with zero velocity and displacement. The same seed produces the same record on every machine, to
+    The peak is exact; the means of duration and band over many seeds agree with the declared values. The motion begins
+    and ends at rest, with zero velocity and displacement. The same seed produces the same record on every machine, to
     rounding. Raises InvalidInput.
     """
     if name not in SHAPES:

@@ -31,7 +31,7 @@ class RecordText:
 
 
 def load(path: Path) -> RecordText:
-    """Read a file. Raises InvalidInput if it cannot be read, is empty or is not text."""
+    """Read a file. Raises InvalidInput if it cannot be read, is too large or empty, or is not text."""
     try:
         content = read_bounded(path)
     except FileNotFoundError:

@@ -80,7 +80,7 @@ class Improvement:
 
 
 def largest_improvement(budgets: Iterable[Mapping[str, float]]) -> Improvement | None:
-    """The contribution whose removal would reduce the expanded uncertainties most; None without contributions.
+    """The contribution whose removal would reduce the expanded uncertainties most; None if there are no contributions.
 
     `budgets` are standard uncertainties by contribution. Each budget has the same weight, whatever its size.
     """

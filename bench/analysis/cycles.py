@@ -1,7 +1,7 @@
 """Fourier coefficients of each cycle of a dwell, by least squares at a known frequency (IEEE 1057, joint harmonics).
 
-A fit over one cycle does not require an integer number of samples, averages the noise of hundreds of samples, and
-yields the peak of the motion without the upward bias of the largest noisy sample.
+A fit over one cycle does not require an integer number of samples, averages the noise over all of them, and yields the
+peak of the motion without the upward bias of the largest noisy sample.
 """
 
 from collections.abc import Mapping, Sequence
@@ -63,7 +63,7 @@ class Cycle:
         """Complex amplitudes z_k of one signal, shape (HARMONICS,): the signal is its mean plus Im(sum of z_k exp(i k
         phase)).
 
-        Harmonics that were not fitted are zero; higher ones are omitted.
+        Harmonics that were not fitted are zero; those above HARMONICS are omitted.
         """
         fitted = (self.coefficients.shape[0] - 1) // 2
         found = np.zeros(HARMONICS, dtype=np.complex128)
@@ -76,7 +76,7 @@ def fit_cycle(
     index: int, phase: NDArray[np.float64], values: NDArray[np.float64], highest: int = HARMONICS
 ) -> Cycle | None:
     """Fit samples `values`, shape (n, m), at `phase` [rad] up to the harmonic `highest`, or up to a lower harmonic if
-    there are few samples. Returns None if too many samples are missing (NaN).
+    there are few samples. Returns None if too many samples are missing (NaN) or there are too few for one harmonic.
     """
     finite = np.isfinite(values)
     share = 1.0
@@ -224,7 +224,7 @@ class CycleAnalyser:
         return self._first + ceil(cycle * tau / self._step)
 
     def push(self, values: NDArray[np.float64]) -> list[Cycle]:
-        """Process the next samples, shape (n, m); returns the cycles that they complete."""
+        """Process the next samples, shape (n, m); returns the fits of the cycles that they complete."""
         self._pending.append(values)
         self._held += values.shape[0]
         if self._start + self._held < self._end():

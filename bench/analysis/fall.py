@@ -10,15 +10,15 @@ from bench.analysis.signals import U1
 from sim.specimen import Specimen
 
 FALLEN_TILT = 0.25
-"""Tilt [rad] at which a block counts as fallen: twice the critical angle of the default block."""
+"""Tilt [rad] at which a block counts as fallen: about twice the critical angle of the default block."""
 
 
 PERIODS = 2.0
 """Number of periods of the frame's first mode over which the first storey's drift u1 is averaged.
 
 In violent rocking without a fall (30 simulated records, up to 3 times the uplift acceleration) the mean over one period
-reaches 1.28 times the threshold, and the mean over two periods 0.68 times. A fall is detected 0.2 to 0.9 s after the
-tilt of the block has exceeded `FALLEN_TILT`.
+reaches 1.28 times the threshold, and the mean over two periods 0.68 times. Simulated falls were detected 0.2 to 0.9 s
+after the tilt of the block had exceeded `FALLEN_TILT`.
 """
 
 

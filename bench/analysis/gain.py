@@ -17,7 +17,7 @@ from bench.analysis.uncertainty import COVERAGE as COVERAGE
 from bench.analysis.uncertainty import Budget, combined_freedom
 
 SCATTER = "scatter of the cycles"
-"""Name of this contribution in the budgets."""
+"""Name of the contribution of the scatter to the budgets."""
 
 DRAWS, SEED = 4000, 1
 """Number of Monte Carlo draws of the sensors' errors; with this number, the expanded uncertainty has a statistical
@@ -37,7 +37,7 @@ table.
 
 PEAK_HARMONICS = 5
 """Highest harmonic used for the peak of a steady drift. An impact acts on the second storey through two springs and two
-masses, so higher harmonics change the peak by less than 1e-4, which is less than the effect of the laser resolution.
+masses, so higher harmonics change the peak by less than 1e-4.
 """
 
 PEAK_ROUNDINGS = 0.6 * (((PEAK_HARMONICS + 1) // 2) ** 2 + (PEAK_HARMONICS // 2) ** 2)

@@ -1,6 +1,6 @@
 """Inverse Fourier transform to real series whose length has a large prime factor, fast if used repeatedly.
 
-For such a length n = a p, the usual algorithm transforms series of more than twice the length, which do not fit in the
+For such a length n = a p, the usual algorithm transforms series of more than twice the length, which may exceed the
 processor's cache. With j = p l + i and k = a m + q, the transform consists of one transform of length p for each q, a
 rotation, and one transform of length a for each i (Cooley and Tukey, 1965). The symmetry of the spectrum halves the
 work.

@@ -47,7 +47,7 @@ the residual is compared with its mean. At smaller distances, the fit reduces th
 """
 
 PASSES = 3
-"""Number of fits, each weighted by the residual of the previous one."""
+"""Number of fits; each after the first is weighted by the residual of the previous one."""
 
 SMALLEST = 1e-9
 """Smallest scatter assumed for a coefficient, relative to the norm of the series, so that its weight stays finite."""

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 DECAYS = (0.7, 0.85, 0.92, 0.95, 0.97, 0.98, 0.988, 0.993)
-"""Moduli rho of the multipliers. Those of the slowest modes of the rocking frame and of the bare frame are 0.97 to
-0.985; with a slower mode, the motion would have been assessed as unsteady.
+"""Moduli rho of the multipliers. Those of the slowest modes of the default specimen, rocking or bare, are 0.97 to
+0.985.
 """
 
 ANGLES = (0.0, 0.015, 0.03, 0.05, 0.08, 0.12, 0.2, 0.3, 0.45, 0.6, 0.8, 1.1, 1.4, 1.7, 2.0, 2.3, 2.6, 2.9, pi)

@@ -16,8 +16,7 @@ class RunningGain:
     not yet known.
 
     The linearity errors of the lasers, which take most of the computing time, are evaluated again when a reading has
-    changed by more than `CHANGED`. Until then, those of the earlier motion are used, scaled with the drift; this
-    changes the uncertainty by less than 1 %.
+    changed by more than `CHANGED`. Until then, those of the earlier motion are used, scaled with the drift.
     """
 
     def __init__(self, bare: SteadyPeak, sensors: SensorUncertainty, shared: SharedDraws) -> None:

@@ -46,7 +46,7 @@ class SensorAccuracy(Parameters):
         2.5e-4, "s", "wander of a laser's delay due to its free-running clock: one measuring period", ge=0, le=0.01
     )
     laser_linearity: float = quantity(
-        0.0008, "1", "largest linearity error of a laser over its range, from its data sheet", ge=0, le=0.05
+        0.0008, "1", "largest linearity error of a laser relative to its range, from its data sheet", ge=0, le=0.05
     )
     table_scale: float = quantity(
         0.005, "1", "relative error of the scales of the table's accelerometer and displacement sensor", ge=0, le=0.1
@@ -62,9 +62,9 @@ class PeakReadings:
 
     drift, sign : the peak [m], and its sign, 1 or -1.
     lasers, speeds : reading of each laser [m] and its rate [m/s].
-    zero : readings [m], shape (2, n), whose mean is the zero of the peak; (0, 0) for a zero taken at rest.
+    zero : readings [m], shape (2, n), whose mean is the zero of the peak; zeros, shape (2, 1), if it was taken at rest.
     swings : span of each laser's readings [m] in the fit of the peak.
-    terms : number of independent rounding errors in the peak; 1 for a mean.
+    terms : mean square rounding error of the peak, relative to that of a mean over the readings of the cycle.
     at_rest : whether the zero was taken at rest, where rounding errors do not average out.
     weights : derivatives of the peak of a fitted cycle with respect to the readings in `zero`, shape (n,); None if the
         peak is the reading at the peak minus the mean of `zero`.
@@ -131,9 +131,9 @@ class SensorUncertainty:
     def drift_errors(
         self, seen: Sequence[PeakReadings], draws: "Draws", shapes: "Shapes | None" = None
     ) -> dict[str, Array]:
-        """Errors [m] of the peaks in tests with the same lasers, by contribution; each has the shape (tests, n).
+        """Errors [m] of the peaks in tests with the same lasers, by contribution, shape (tests, n) each.
 
-        `shapes` are the linearity errors of `seen`, or of motions that differ little from it; by default they are
+        `shapes` are the linearity errors of `seen`, or of motions that hardly differ; by default they are
         computed.
         """
         found = self.shapes(seen) if shapes is None else shapes

@@ -38,8 +38,7 @@ def further_of(channels: Sequence[Channel]) -> tuple[Further, ...]:
 
 
 class SignalMap:
-    """Converts channel values to signals relative to the zero taken at rest. Each run has one instance, owned by the
-    guard, which enforces the limits.
+    """Converts channel values to signals relative to the zero taken at rest.
 
     Lasers on the ground measure x_g + u, with the table displacement x_g; lasers on the table measure u. In both cases
     the drift does not depend on x_g. A `calibration` corrects lasers and table sensors for their identified errors. All

@@ -25,7 +25,7 @@ KIN_SHARE = 0.25
 class Steadiness:
     """Steadiness of a dwell, a period of constant drive. `spread`, the deviation of the cycles within a window, and
     `drift`, the change of the mean between the windows, are relative to each signal's mean amplitude and in excess of
-    its noise; each is the largest value over all signals.
+    its noise; each is the largest value over the assessed signals.
 
     `repeats` is the number of cycles after which the motion repeats: 1 if it is steady, 2 to 6 for a subharmonic, 0 if
     it does not repeat.

@@ -44,7 +44,7 @@ def noise_density(rest: Array, sample_rate: float) -> tuple[Array, Array]:
 
 
 MODEL_RATE = 1000.0
-"""Sample rate of the model's input [1/s], at most that of the bench."""
+"""Sample rate of the model's input [1/s], of which the nearest integer fraction of the bench's sample rate is used."""
 
 _TOP = 0.4
 """Frequency up to which the motion is retained, as a fraction of the sample rate of the model's input."""

@@ -38,14 +38,14 @@ class RunningPeak:
         return self._seen
 
     def push(self, block: Array) -> float:
-        """The largest magnitude up to the end of `block`, shape (n,); NaN before the first value."""
+        """The largest magnitude up to the end of `block`, shape (n,); NaN before the first valid sample."""
         self._seen += block.size
         self._largest = float(np.fmax.reduce(np.abs(block), initial=self._largest))
         return self._largest
 
 
 def running_peak(signal: Array) -> Array:
-    """The largest magnitude up to each sample, shape (n,); NaN before the first value."""
+    """The largest magnitude up to each sample, shape (n,); NaN before the first valid sample."""
     return np.fmax.accumulate(np.abs(signal))
 
 
@@ -77,7 +77,7 @@ class TransientPeak:
     """The largest magnitude of a signal, in the unit of the signal.
 
     `value` is corrected for the selection of the largest maximum; `uncertainty` is the standard uncertainty due to
-    noise alone; `bias` is the largest shift due to the degree of the fitted polynomial. `time` [s] is the time of the
+    noise alone; `bias` is the estimated shift due to the degree of the polynomial. `time` [s] is the time of the
     largest maximum since the first sample, `sign` its sign, `window` [s] the half width of the fit, and `rivals` the
     number of other maxima that may be the largest.
     """

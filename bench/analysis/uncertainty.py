@@ -176,6 +176,6 @@ def plus_minus(value: float, uncertainty: float, sign: str = "+-") -> str:
 
 
 def in_brackets(value: float, uncertainty: float) -> str:
-    """A value with its uncertainty in units of the last digits, as in 213.44(16); the value alone if there is none."""
+    """A value with its uncertainty in units of the last digit, as in 213.44(16); the value alone if it has none."""
     places = decimals(uncertainty)
     return f"{value:.6g}" if places is None else f"{value:.{places}f}({round(uncertainty * 10.0**places):d})"

@@ -1,1 +1,1 @@
-"""The application: sessions, queue, reports, exports, command line, window, benchmark."""
+"""The application: sessions, queue, reports, exports, command line, window and benchmark."""

@@ -64,12 +64,12 @@ def format_names() -> tuple[str, ...]:
 
 
 def protocol_of(record: "DataFile") -> "Protocol[Any]":
-    """The protocol of an open data file. Raises InvalidInput if it is not installed."""
+    """The protocol of an open data file. Raises InvalidInput if it is not installed or fails to load."""
     return load_protocol(record.metadata.get("protocol", ""), "protocol of the data file")
 
 
 def installed_protocol(record: "DataFile") -> "Protocol[Any] | None":
-    """The protocol of an open data file; None if it is not installed."""
+    """The protocol of an open data file; None if it is not installed or fails to load."""
     try:
         return protocol_of(record)
     except InvalidInput:
@@ -77,8 +77,8 @@ def installed_protocol(record: "DataFile") -> "Protocol[Any] | None":
 
 
 def parameters_of(record: "DataFile", protocol: "Protocol[Any]", changed: dict[str, Any] | None = None) -> "Parameters":
-    """The stored parameters of a run, updated with `changed`. Raises InvalidInput for parameters unknown to this
-    version.
+    """The stored parameters of a run, updated with `changed`. Raises InvalidInput for parameters that this version does
+    not accept.
 
     A parameter that may be None, and is missing from the file of an earlier version, is set to None instead of its
     default: the run is then repeated without it.

@@ -16,7 +16,7 @@ def clock(seconds: float) -> str:
 
 
 def number(value: float | None) -> str:
-    """Four significant digits; `ABSENT` for None and NaN."""
+    """Four significant digits; `ABSENT` for None and values that are not finite."""
     return ABSENT if value is None or not isfinite(value) else f"{value:#.4g}".rstrip(".")
 
 

@@ -162,7 +162,7 @@ class Campaign:
 
     @property
     def tables(self) -> dict[str, dict[str, Quantity]]:
-        """All other non-empty tables: "prediction", "preflight", "estimates" and so on."""
+        """All other non-empty tables except the journal: "prediction", "preflight", "estimates" and so on."""
         return {name: table for name, table in self._tables.items() if name not in ("points", "events")}
 
     @property

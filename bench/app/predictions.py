@@ -89,7 +89,7 @@ class SeismicPrediction:
     """Gain under an earthquake record; arrays of shape (n_beta,), or () for a single stiffness, NaN where the block
     overturned.
 
-    `motion` is the acceleration of the table: the record limited to the band and scaled.
+    `motion` is the acceleration of the table: the record after the requested trimming, filtering, scaling and fitting.
     """
 
     beta: Quantity

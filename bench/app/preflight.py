@@ -26,7 +26,7 @@ from sim.loading import BENCH, load_model
 from sim.parameters import Parameters
 
 SPARE = 3.0
-"""Factor by which a run may exceed its expected duration: every start may fail, and every motion may settle slowly."""
+"""Factor allowed for a run longer than expected, since a start may fail and a motion may settle slowly."""
 
 OVERHEAD = 1.1
 """Factor for contents other than samples: blocks, events, estimates, tables, and the overhead of the format."""
@@ -34,12 +34,12 @@ OVERHEAD = 1.1
 DRIVE_BYTES = 4
 """Bytes per drive sample in the file."""
 RAW_BYTES = 6
-"""Bytes per raw value of a serial laser in the file, compressed."""
+"""Estimated bytes per raw value of a serial laser in the file, compressed."""
 
 
 @dataclass(frozen=True)
 class DiskSpace:
-    """Bytes that the data file may need, uncompressed, and bytes that are free in its `folder`."""
+    """Bytes that the data file may need, and bytes that are free on the disk of its `folder`."""
 
     folder: Path
     needed: int
@@ -84,13 +84,13 @@ def _readable(size: int) -> str:
 
 
 DIGITS = 9
-"""Significant digits of computed numbers in the hash, few enough to be equal on all processors."""
+"""Significant digits of computed numbers in the hash; rounding errors, which depend on the processor, are smaller."""
 
 
 def plan_hash(
     protocol: str, parameters: Parameters, configuration: BenchConfiguration, version: str, forecast: Forecast
 ) -> str:
-    """SHA-256, as 64 hexadecimal digits, over canonical JSON: sorted keys, no spaces, no NaN.
+    """SHA-256, as 64 hexadecimal digits, of canonical JSON: sorted keys, no spaces, no NaN.
 
     Requested values are hashed exactly, computed ones to nine digits.
     """

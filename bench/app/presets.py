@@ -35,7 +35,7 @@ class Presets:
         return sorted(path.stem for path in (self._folder / protocol).glob("*.toml"))
 
     def path(self, protocol: str, name: str) -> Path:
-        """File of a preset. Raises InvalidInput for a name that is not a valid file name."""
+        """File of a preset. Raises InvalidInput for a name that is not allowed."""
         if name.endswith((".", " ")):
             raise InvalidInput("preset", name, "Windows removes a dot or space at the end of a name; omit it")
         if _RESERVED.fullmatch(name):
@@ -55,7 +55,7 @@ class Presets:
 
     def save(self, protocol: Protocol[Any], name: str, typed: Typed) -> Path:
         """Save a preset, replacing one with the same name; returns its file. Raises InvalidInput for a name that is not
-        a valid file name, and RockbenchError if the file cannot be written.
+        allowed, and RockbenchError if the file cannot be written.
         """
         path = self.path(protocol.name, name)
         _write(path, protocol, typed)

@@ -45,11 +45,12 @@ def run(
     seed, realtime : seed of a simulated bench, and whether it runs in real instead of virtual time.
     out : folder for the results, by default runs/<protocol>-<date>T<time>.
     operator : called with each request to the person at the bench; must return True once the task is done. Without it,
-        a simulated bench confirms every request, and a run on a real bench is refused.
+        a bench that performs the tasks itself, such as the simulated one, confirms every request, and a run on any
+        other bench is refused.
     progress : called with an activity and its completed fraction, 0 to 1.
 
     Raises InvalidInput for a refusal before the table moves, and KeyboardInterrupt after Ctrl-C (or SIGTERM), once the
-    output has been ramped to zero and the file closed as aborted.
+    output is at zero and the file, if it exists, is closed.
     """
     chosen = load_protocol(protocol)
     values = valid(chosen.parameters, {**(parameters or {}), **more})
@@ -64,8 +65,7 @@ def run(
     review(bench).require()
     if operator is None and not bench.serves_itself:
         allowed = (
-            "the bench is real: pass a function that shows a request to the operator and returns True once the task "
-            "is done"
+            "this bench needs an operator: pass a function that shows a request and returns True once the task is done"
         )
         raise InvalidInput("operator", None, allowed)
     person, requests = _Person(operator), Requests()

@@ -1,4 +1,4 @@
-"""Displayed state of a run, updated from the stream of events; shared by all clients."""
+"""Displayed state of a run, updated from the stream of events; used by all clients."""
 
 from collections import deque
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""A campaign from configuration to result files: rig, guard, engine, recorder, summary."""
+"""A campaign from configuration to result files: rig, guard, engine, recorder and summary."""
 
 import json
 import time
@@ -72,7 +72,8 @@ def run_session(
     progress : receives the stages before the rig is opened and after it is closed.
 
     Raises InvalidInput before the table moves, and KeyboardInterrupt if an end is requested before the data file is
-    created. Once the rig is armed, every ending is a result with a status.
+    created. Once the rig is armed, every ending of the motion is a result with a status; an error while result files
+    are written is raised.
     """
     started = time.monotonic()
     name = f"the protocol {protocol.name}"

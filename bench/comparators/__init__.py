@@ -1,1 +1,1 @@
-"""Alternative integrators of the motions of `sim.rocking`, for comparison: fixed-step methods, scipy, CVODE, heyoka."""
+"""Alternative integrators of the motions of `sim.rocking`, for comparison: RK4, scipy, CVODE and heyoka."""

@@ -46,7 +46,7 @@ class RigSettings(Parameters):
     force_constant: float | None = quantity(
         None,
         "N/A",
-        "force per ampere of the coil, used to estimate its current",
+        "force per ampere of the coil, used to estimate its current; if absent, force and current are not estimated",
         gt=0,
         usual=(5.0, 200.0),
         example=50.0,

@@ -61,7 +61,7 @@ class BenchConfiguration(Parameters):
         None,
         "",
         "JSON file of an identified table model, relative to this file, used to predict the drive; if absent, the "
-        "drive is predicted from the simulated shaker",
+        "drive is predicted for the simulated bench only, from its shaker",
         example="table_model.json",
     )
     limits: Limits = Limits()
@@ -145,7 +145,7 @@ class BenchConfiguration(Parameters):
 
     @property
     def table_band(self) -> tuple[float, float]:
-        """The table's usable band [Hz], to which records are filtered before scaling."""
+        """The table's usable band [Hz], to which records can be limited before scaling."""
         return self.settings.band_low, self.settings.band_high
 
     @property
@@ -199,7 +199,7 @@ class BenchConfiguration(Parameters):
 
     @property
     def serves_itself(self) -> bool:
-        """Whether tasks between two tests need no operator: the bench is simulated or emulated."""
+        """Whether tasks between two tests need no operator, as on the simulated and on an emulated bench."""
         if self.backend == "hardware":
             return self.hardware.emulator_address is not None
         return not load_backend(self.backend).operator
@@ -207,7 +207,7 @@ class BenchConfiguration(Parameters):
     @field_validator("backend")
     @classmethod
     def _installed_backend(cls, name: str) -> str:
-        # built-in backends are loaded only when a rig is opened
+        # validation does not load the built-in backends
         if name not in _TABLES:
             try:
                 load_backend(name)

@@ -1,7 +1,7 @@
 """The paper's statements as checks of the model: 1 to 7 on harmonic motion, 8 on earthquake records.
 
 The claims are those of sections 3.3.1, 4.2, 4.3, 5.1 and 5.2 of the paper. Steady motions are rocking orbits, computed
-by continuation over frequency at constant stiffness, without simulating transients.
+by continuation in frequency at constant stiffness, without simulating transients.
 """
 
 from collections.abc import Mapping, Sequence

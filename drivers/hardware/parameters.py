@@ -155,7 +155,12 @@ class Hardware(Parameters):
         example=50.0,
     )
     force_constant: float | None = quantity(
-        None, "N/A", "force constant of the coil, used to estimate the current", gt=0, usual=(5.0, 200.0), example=50.0
+        None,
+        "N/A",
+        "force constant of the coil, used to estimate its current; if absent, force and current are not estimated",
+        gt=0,
+        usual=(5.0, 200.0),
+        example=50.0,
     )
     emulator_address: str | None = quantity(
         None,

@@ -11,8 +11,8 @@ density of this noise is measured at rest before the motion;
 - linearity: sine waves over the lasers' range, of any phase and typical numbers of periods, mostly absorbed by the
 fitted curvature;
 - masses: the uncertainty of the weighing;
-- timebase: a relative error of the sample clock appears once in frequencies and dashpots, twice in stiffnesses, and not
-    in damping ratios.
+- timebase: a relative error of the sample clock causes the same relative error of frequencies and dashpots, twice this
+error of stiffnesses, and none of damping ratios.
 
 Errors due to noise, table and clock are independent between decays. Those due to linearity, masses and timebase are
 common to all decays.

@@ -69,7 +69,7 @@ def pulsed_decay(signals: Array, setting: Setting, quiet: float, begin: float) -
 
 
 def released_decay(signals: Array, setting: Setting) -> Decay:
-    """The decay of a frame that was released, with the table locked, some time after the start of the recording.
+    """The decay of a frame that was held at the start of the recording and then released, with the table locked.
 
     Raises Unusable if the fit fails.
     """
@@ -102,7 +102,9 @@ def _released(stretch: Stretch) -> float:
     seen = stretch.readings[1] - np.nanmedian(stretch.readings[1][stretch.time < _HELD])
     moved = np.nan_to_num(np.abs(seen))
     if moved.max() < 10.0 * np.nanstd(stretch.readings[1][stretch.time < _HELD]):
-        raise Unusable("the frame was not released during the recording: release it earlier, or record for longer")
+        raise Unusable(
+            f"no release was found in the recording: hold the storey for the first {_HELD:g} s, then release it"
+        )
     return float(stretch.time[np.argmax(moved > _SLIPPED * moved.max())])
 
 
@@ -132,7 +134,7 @@ def combine(values: Sequence[Array], own: Sequence[Array], common: Sequence[Arra
     """Combine R decays, each with `values`, shape (n,), and covariances, shape (n, n).
 
     Each quantity is the mean of the decays, weighted by their independent parts. Excess scatter enlarges the covariance
-    (`bench.analysis.uncertainty`) and never reduces it. The common part is added once.
+    (`bench.analysis.uncertainty`); a small scatter does not reduce it. The common part is added once.
     """
     found = mean_of_repeats(values, [np.diag(one) for one in own])
     inner = np.einsum("rn,rm,rnm->nm", found.weights, found.weights, np.array(own))

@@ -100,7 +100,7 @@ expected to be 0 [s].
 """
 
 BEND_UNCERTAINTY = 1e-3
-"""Standard uncertainty of the curvature terms at the largest motion [m]: several times the data sheet's limit."""
+"""Standard uncertainty of the curvature terms at the largest motion [m]."""
 
 NOISE = 2e-5
 """Noise of a laser [m], which determines the weight of the samples relative to that of the expected values."""
@@ -113,7 +113,7 @@ class Fit:
     `jacobian`, shape (COUNT, 2, n), holds the derivatives of the laser signals with respect to the values, zero where a
     sample is missing; `mass_jacobian`, shape (2, 2, n), those with respect to the masses; `residual` [m], shape (2, n),
     measured minus fitted, zero where missing; `expected`, shape (COUNT, COUNT), is the contribution of the expected
-    values to the normal matrix, and `inverse` the inverse of the total matrix.
+    values to the normal matrix, `inverse` the inverse of the total matrix; `fitted` [m], shape (2, n), is the model.
     """
 
     stretch: Stretch

@@ -19,12 +19,12 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 RATE = 20.0
-"""Sample rate of the estimate [1/s]: a few samples per period of the second mode, since otherwise noise would
-dominate.
+"""Approximate sample rate of the estimate [1/s]: a few samples per period of the second mode, because noise dominates
+the differences of closer samples.
 """
 
 LENGTH = 15.0
-"""Duration used for the estimate [s], after which the second mode has decayed."""
+"""Longest duration used for the estimate [s]; later, the second mode has usually decayed."""
 
 DAMPING = 0.003, 0.06
 """Range to which the estimated damping ratios are limited."""

@@ -16,7 +16,7 @@ from sim.errors import RockbenchError
 Array = NDArray[np.float64]
 
 RATE = 200.0
-"""Highest sample rate after the reduction [1/s]: far above the modes and their harmonics."""
+"""Lowest sample rate to which samples are averaged [1/s]: far above the frequencies of the frame's modes."""
 
 MOST_LOST = 0.02
 """Largest permitted fraction of missing samples of a sensor."""

@@ -1,5 +1,5 @@
-"""Results of several tilts with their uncertainties: restitution, its trend, critical angle, frequency parameter. The
-errors of the laser are modelled as follows.
+"""Results of several tilts with their uncertainties: restitution, its trend, critical angle and frequency parameter.
+The errors of the laser are modelled as follows.
 
 Linearity: a smooth error, size sin(2 pi n x / range + phase), with `size` from the data sheet, and with uniformly
 distributed phase and number n of periods within the measuring range; it is common to all tilts. The fitted curvature
@@ -31,7 +31,7 @@ from sim.specimen import Specimen
 Array = NDArray[np.float64]
 
 POOR = 0.2
-"""Ratio of the rms residual to the mean peak displacement above which the model does not describe the motion.
+"""Ratio of the rms residual to the mean peak displacement above which a tilt is rejected.
 
 Impacts whose restitution differs by 1 % cause a ratio of about 0.1.
 """
@@ -90,7 +90,7 @@ as a scale error, one with more is not smooth.
 """
 
 CLOCK = 50e-6
-"""Largest relative difference between the rates of the laser's clock and the sample clock, both of which are quartz
+"""Assumed largest relative difference between the rates of the laser's clock and the sample clock, as of two quartz
 clocks.
 """
 
@@ -102,7 +102,7 @@ delays.
 
 @dataclass(frozen=True, eq=False)
 class LaserErrors:
-    """A laser's errors from its data sheet; `measuring_range` is in m."""
+    """Errors of a laser with the specified `accuracy`; `measuring_range` is in m."""
 
     accuracy: SensorAccuracy
     measuring_range: float
@@ -179,8 +179,8 @@ def combined(values: ArrayLike, noise: ArrayLike, timing: ArrayLike, linearity: 
     """Mean of n `values`, weighted by their independent standard uncertainties `noise` and `timing`.
 
     `linearity`, shape (n, components), holds the shifts due to errors common to all values, component by component, and
-    `scale` is a common standard uncertainty. Scatter beyond the independent uncertainties widens the result and makes
-    the weights more equal (`bench.analysis.uncertainty`).
+    `scale` is a common standard uncertainty. Scatter beyond the independent uncertainties increases the uncertainty of
+    the mean and makes the weights more equal (`bench.analysis.uncertainty`).
     """
     found, own, wander = (np.asarray(each, dtype=np.float64) for each in (values, noise, timing))
     repeats = mean_of_repeats(found[:, None], (own**2 + wander**2)[:, None])

@@ -34,7 +34,7 @@ FEWEST = 12
 """Minimum number of impacts for a fit."""
 
 _RATE = 250.0
-"""Sample rate of the fit [1/s], to which the laser's samples are averaged; it is high enough for the motion."""
+"""Approximate sample rate of the fit [1/s], to which the laser's samples are averaged."""
 
 _IMPACT, _ANGLE = 1e-4, 1e-4
 """Standard uncertainties of single impacts [s] and turning points [rad] in the preliminary fit."""
@@ -220,5 +220,7 @@ def _least_squares(function: Callable[[Array], Array], start: Array, lowest: Arr
 
     found: Any = least_squares(function, start, bounds=(lowest, highest), x_scale="jac", max_nfev=60)
     if not found.success:
-        raise NotRocking("no motion of a rocking block fits the signal: check the block's base and sides and the laser")
+        raise NotRocking(
+            "the fit of a rocking motion to the signal did not converge: check the laser and the block's base and sides"
+        )
     return found

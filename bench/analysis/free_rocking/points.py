@@ -1,7 +1,7 @@
 """Single points of the motion, each determined from the samples around it: impact times and turning points, and the
 restitution that follows from them. They assume only a smooth motion between impacts, and are therefore a check of a
 model fitted to the entire motion. A Butterworth low-pass delays a smooth motion without distortion: its gain has no
-term in omega^2, so its impulse response has no second cumulant, and a parabola passes unchanged. Its response to the
+term in omega^2, so its impulse response has no second cumulant, and a parabola is only delayed. Its response to the
 kink at an impact has decayed after `AFTER`, and those samples are excluded.
 
 Between impacts the energy is constant, so the largest angles before and after an impact give the restitution of the
@@ -10,7 +10,7 @@ angular velocity, exactly and independent of time:
     r_n^2 = (cos(alpha - |theta_n+1|) - cos(alpha)) / (cos(alpha - |theta_n|) - cos(alpha)).
 
 For a constant r the logarithm of that energy falls linearly, by 2 ln(r) per impact; the line through all points gives
-the mean r. alpha and the laser's scale have little influence: both sides of the quotient contain them.
+the mean r. alpha and the laser's scale have little influence: numerator and denominator contain them.
 """
 
 from dataclasses import dataclass
@@ -43,8 +43,8 @@ _FEWEST = 12
 
 @dataclass(frozen=True, eq=False)
 class Points:
-    """Times of the `impacts` [s], accurate to 50 us, and signed `amplitudes` [rad] of the turning points that follow
-    them, with their standard uncertainties due to noise; shape (n,) each, NaN where too few samples remain.
+    """Times of the `impacts` [s] and signed `amplitudes` [rad] of the turning points that follow them, with their
+    standard uncertainties due to noise; shape (n,) each, NaN where too few samples remain.
     """
 
     impacts: Array

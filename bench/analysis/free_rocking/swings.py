@@ -15,10 +15,10 @@ REST = 1.0
 """Duration at the end of a recording during which the block must be at rest [s]."""
 
 GAP = 0.005
-"""Longest gap without valid samples [s] that is interpolated; the error of the interpolation is below 5 um."""
+"""Longest gap without valid samples [s] that is interpolated."""
 
 STILL = 2e-4
-"""Largest standard deviation [m] of the displacement at rest, due to the resolution and noise of a laser."""
+"""Standard deviation [m] of the displacement up to which the block counts as at rest; it allows for a laser's noise."""
 
 _HELD = 0.5
 """Duration at the beginning of a recording over which the initial tilt is averaged [s]."""
@@ -87,7 +87,7 @@ def without_gaps(seen: Recording) -> Recording:
 def find_swings(seen: Recording, least: float) -> Swings:
     """The half swings before the first one whose largest angle is below `least` [rad].
 
-    Raises NotRocking, with a remedy, if the block was not released or did not come to rest.
+    Raises NotRocking, with a remedy, if the block was not tilted or not released, or did not come to rest.
     """
     n = round(REST * seen.sample_rate)
     end = seen.displacement[-n:]
@@ -100,7 +100,7 @@ def find_swings(seen: Recording, least: float) -> Swings:
     held = float(np.median(angle[: round(_HELD * seen.sample_rate)]))
     if abs(held) < least:
         raise NotRocking(
-            f"the block was upright at the beginning, {held:+.4f} rad: tilt it before the recording, then repeat"
+            f"the tilt of the block at the beginning is too small, {held:+.4f} rad: tilt it farther, then repeat"
         )
     side = np.where(np.abs(angle) > _SHARE * least, np.sign(angle), 0.0)
     known = np.flatnonzero(side)

@@ -1,4 +1,4 @@
-"""Operations of a Taylor step, counted in its source, and the share of the core's peak that the engine reaches."""
+"""Operations of a Taylor step, counted by executing its source, and the fraction of the core's peak rate achieved."""
 
 from collections.abc import Callable
 from math import cos, pi, sin, sqrt
@@ -27,14 +27,14 @@ COLUMNS = (
 )
 
 MEMBERS = 2 * LANES
-"""Number of trajectories side by side."""
+"""Number of trajectories computed side by side."""
 
 ROUNDS = 200_000
 """Multiply-adds of each chain in the measurement of the peak."""
 
 
 class Counted:
-    """A number whose additions, multiplications, divisions and roots are counted; a fused multiply-add counts as two.
+    """A number whose sums, differences, products, quotients and roots are counted; a fused multiply-add counts twice.
 
     The sine and the cosine are not counted.
     """
@@ -98,7 +98,7 @@ def _value(number: "Counted | float") -> float:
 
 
 class Cells:
-    """An array of numbers that count, accessed by the functions of `sim.kernel.lanes`."""
+    """An array of counted numbers, accessed by the functions of `sim.kernel.lanes`."""
 
     def __init__(self, values: NDArray[np.float64]) -> None:
         self._values: dict[tuple[int, ...], Counted] = {
@@ -141,7 +141,7 @@ _COUNTING: dict[str, Callable[..., Any]] = {
 
 
 def _counting(function: Callable[..., None]) -> Callable[..., None]:
-    """The same source on numbers that count."""
+    """The function for counted numbers: the same code with the operations of `_COUNTING`."""
     assert isinstance(function, FunctionType)
     return FunctionType(function.__code__, {**function.__globals__, **_COUNTING}, argdefs=function.__defaults__)
 

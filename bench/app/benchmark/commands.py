@@ -108,8 +108,8 @@ def _measured(arguments: Sequence[str], folder: Path) -> dict[str, Cell]:
 
 
 def _ended(process: "subprocess.Popen[bytes]") -> tuple[int, float | None, float | None]:
-    """Exit code, processor time [s] and peak memory [MB] of a process, when it has ended.  On Linux the peak memory is
-    at least that of the parent process.
+    """Exit code, processor time [s] and peak memory [MB] of a process after its end. On Linux the peak memory is at
+    least that of the parent process.
     """
     if sys.platform == "win32":
         end(process, float("inf"))

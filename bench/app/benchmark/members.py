@@ -84,7 +84,7 @@ def members(repetitions: int) -> Section:
 
 def _at_equal_error(rows: list[dict[str, Cell]]) -> float | None:
     """For each setting of heyoka, the time of the engine's fastest setting that is at least as accurate is divided by
-    heyoka's time. Returns the greatest of these ratios; None if there is none.
+    heyoka's time. Returns the greatest of these ratios; None if no settings can be compared.
     """
     found = {name: [row for row in rows if row["method"] == name and row["status"] == "ok"] for name in (OURS, THEIRS)}
     ratios: list[float] = []

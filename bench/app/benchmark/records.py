@@ -69,7 +69,7 @@ def gain_maps(n: int, runs: int, repetitions: int) -> Section:
     overturned = sum(motion.overturned is not None for motion in motions)
     notes = (
         "Orbits: both branches, peaks and Floquet multipliers. Runs: peaks of the last 20 periods; "
-        f"the runs that overturn early ({overturned} of {ran}) cost less. A run reproduces the orbit if its alpha_2 "
+        f"the runs that overturn ({overturned} of {ran}) end early. A run reproduces the orbit if its alpha_2 "
         "differs from that of the orbit by less than 2 %.",
         "Error of the orbits: greatest relative difference from the peaks of one period integrated by dop853 at "
         "1e-13 from the start of the orbit, at nine points spread over the map.",
@@ -96,7 +96,7 @@ def _by_time(specimen: Specimen, betas: np.ndarray, omegas: np.ndarray) -> list[
 
 
 def _settled(chart: GainMap, chosen: np.ndarray, k: int, motion: Motion) -> bool:
-    """Whether run `k` ended on the rocking orbit."""
+    """Whether run `k` reproduces the peak drift of the rocking orbit within 2 %."""
     i, j = divmod(k, chosen.size)
     exact = chart.rocking.peaks[chosen[i], chosen[j], 1]
     return motion.overturned is None and bool(abs(motion.peaks.drift / exact - 1.0) < 0.02)

@@ -42,7 +42,7 @@ def scaling(repetitions: int) -> Section:
         *_growth("members", "runs", (50, 100, 200, 400), _scatter_of, max(1, repetitions // 4)),
     ]
     notes = (
-        "Exponent: least-squares slope of log(time) over log(size); a constant part reduces it below 1.",
+        "Exponent: least-squares slope of log(time) against log(size); a constant part reduces it.",
         "Memory: peak allocation by Python and numpy during a run; the workspace of the compiled kernel "
         "depends only on the order of the series.",
     )
@@ -125,8 +125,8 @@ def startup(warm_runs: int) -> Section:
     notes = (
         "On a machine under other load, processor time is more meaningful than elapsed time. A helper process compiles "
         "a part of the kernel at the same time.",
-        "Half of the compilation time is that of the function that advances many members, which is compiled after all "
-        "others; four fifths of it are the compiler's analysis in Python, not the optimisation of machine code.",
+        "About half of the compilation time is spent on the function that advances many members, which is compiled "
+        "last. Compilation is mostly the compiler's analysis in Python, not the optimisation of machine code.",
     )
     targets = (
         Target("compilation for predict steady", 4.0, cold - warm, "s"),

@@ -53,7 +53,7 @@ class Method:
 
 
 def methods(quick: bool) -> list[Method]:
-    """All methods; with `quick`, slow methods are omitted or run at a single setting."""
+    """All methods at all settings; with `quick`, at fewer settings."""
     taylor = (1e-6, 1e-8, 1e-10, 1e-12, 1e-13) if quick else (1e-6, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12, 1e-13, 1e-14)
     scipy = {"RK45": {1e-6: 1.2}, "DOP853": {1e-10: 1.5}, "LSODA": {1e-10: 1.2}, "Radau": {1e-6: 4.0}}
     if not quick:

@@ -81,8 +81,8 @@ def analyse(
 ) -> int:
     """Recompute every result of a recorded campaign from its samples, with other settings.
 
-    The new results are printed next to the old ones and written to a separate file in the same folder, together with
-    the settings and the name and SHA-256 of the recorded file. A protocol that identifies the specimen also writes
+    The new results are printed next to the old ones and written to a separate file, together with the settings and the
+    name and SHA-256 of the recorded file. A protocol that identifies the specimen also writes
     `<name>.specimen.json` for other runs. Settings that would have changed the drive of the table are refused: the
     recorded samples cannot show their effect.
 

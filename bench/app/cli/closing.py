@@ -12,7 +12,7 @@ from collections.abc import Callable
 from typing import Any
 
 CLOSED = (2, 5, 6)
-"""Console events: the window is closed, the user logs off, the computer shuts down."""
+"""Console events that end the run: closing of the window, logoff of the user, and shutdown of the computer."""
 GRANTED = 4.5
 """Longest wait for the end of the process [s]."""
 

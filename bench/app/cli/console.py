@@ -22,7 +22,7 @@ REDRAW_INTERVAL = 0.125
 
 
 class LiveConsole:
-    """A subscriber that displays the run on a terminal; a context manager that restores the terminal on exit.
+    """A subscriber that displays the run on a terminal, and a context manager that removes the display on exit.
 
     Events only update the display in memory. A separate thread redraws it after a change, so that the engine never
     waits for a terminal. With `person_answers`, the display is hidden while a question to the operator is open.
@@ -134,7 +134,7 @@ _WIDE = 100
 _NUMBERS = ("omega\n[rad/s]", "beta", "alpha_2\n(k = 2)", "predicted", "off by")
 _WORDS = ("agrees", "status", "measured over")
 _AROUND_TABLE = 11 + NOTICES
-"""Number of lines of the display without the rows of the table."""
+"""Number of lines of the display other than the rows of the table and the live values."""
 
 
 def draw(scene: RunDisplay, width: int, height: int) -> RenderableType:
@@ -151,7 +151,7 @@ def draw(scene: RunDisplay, width: int, height: int) -> RenderableType:
 
 
 def log_line(notice: Notice) -> Text:
-    """One line of the log: time, kind, text."""
+    """One line of the log: time, kind and text."""
     return Text.assemble(
         (f"{clock(notice.time):>8}  ", "dim"),
         (f"{notice.kind:<8} ", "bold red" if notice.grave else "bold"),

@@ -46,7 +46,7 @@ def devices(
     """List the NI devices with their channels and ranges, the lasers on the serial ports, and the rig backends.
 
     Each port is queried at every baud rate; specify the ports if other instruments must not be disturbed. The exit code
-    is 0, even if nothing is found, or 2 if an argument is refused.
+    is 0, even if nothing is found, or 2 if an argument or the configuration is refused.
     """
     progress("searching for NI devices")
     if server is not None:
@@ -57,7 +57,7 @@ def devices(
     server = server if server is not None or hardware is None else hardware.daq.server
     daq = None if hardware is None else hardware.daq
     found, missing = _daq(server, None if daq is None else daq.tls, plain=daq is not None and daq.plain_connection)
-    progress("querying the serial ports, about 4 s")
+    progress("querying the serial ports")
     lasers, no_ports = _lasers(port or _configured(hardware))
     backends, failed = all_backends()
     content: dict[str, Any] = {

@@ -127,8 +127,8 @@ def _text(found: "Preflight") -> str:
 
 
 def _margins(margins: "tuple[Margin, ...]") -> str:
-    """Table of margins, tightest first. Of the specimens within the uncertainty, 95 % have at least the margins in the
-    column "at 95 %".
+    """Table of margins, tightest first. A margin in the column "at 95 %" is kept with a probability of 95 %, given the
+    uncertainty of the specimen.
     """
 
     def number(value: float | None) -> str:

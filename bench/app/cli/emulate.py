@@ -189,7 +189,7 @@ def _report_lateness(laboratory: "Laboratory") -> None:
     """Warn of late values, which a client would otherwise attribute to its connection."""
     for name, delay in laboratory.late().items():
         print_warning(
-            f"emulated laboratory: {name} sent values {delay:.2f} s late, because this computer is busy: close other "
+            f"emulated laboratory: {name} sent values {delay:.2f} s late; this computer may be busy: close other "
             "programs, or increase acquisition.lead"
         )
 

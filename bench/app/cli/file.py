@@ -1,4 +1,4 @@
-"""Commands on data files: `rockbench file info`, `verify` and `recover`, and `rockbench export`."""
+"""Commands for data files: `rockbench file info`, `verify` and `recover`, and `rockbench export`."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -35,7 +35,7 @@ def info(file: CampaignFile, /, *, as_json: Json = False, progress: Handed = sil
 
 
 def verify(file: CampaignFile, /, *, as_json: Json = False, progress: Handed = silent) -> int:
-    """Check every dataset of a data file against its checksum and against the file layout.
+    """Check the datasets of a data file against their checksums and against the file layout.
 
     The exit code is 0 if the file is complete and unchanged, 2 if it is damaged or refused.
     """
@@ -84,8 +84,9 @@ def recover(
 ) -> int:
     """Rebuild a file after a crash or a full disk, or upgrade one of an older version.
 
-    The original is only read. Intact data are copied to a new file of the current layout with checksums; lost events
-    are restored from the journal next to the file. The exit code is 0, or 2 if the file is refused.
+    The original is only read. All readable data are copied to a new file of the current layout with checksums; lost
+    events are restored from the journal next to the file, if there is one. The exit code is 0, or 2 if the file is
+    refused.
     """
     progress("loading the program")
     from bench.datafile.recovery import recover as rebuild
@@ -136,8 +137,8 @@ def export(
 ) -> int:
     """Write a recorded campaign for other programs: every channel and the drive, and the tables of results.
 
-    Writes one file per run; names and units are kept, and missing samples are NaN. Every dataset is compared with its
-    checksum; damaged ones are reported and listed in the file DAMAGED.txt of the folder. The exit code is 0 if
+    Writes one file per run; names and units are kept, and missing samples are NaN. Datasets are compared with their
+    checksums; damaged ones are reported and listed in the file DAMAGED.txt of the folder. The exit code is 0 if
     everything was written, 1 if the disk failed, 2 if an input was refused, 130 after Ctrl-C; no partial files remain.
     """
     progress("loading the program")

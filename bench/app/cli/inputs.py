@@ -1,4 +1,4 @@
-"""Validation of a command's inputs from flags and files: parameters, configuration, specimen, records."""
+"""Validation of a command's inputs from flags and files: parameters, configuration, specimen and records."""
 
 import sys
 from collections.abc import Mapping, Sequence

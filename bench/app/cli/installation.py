@@ -1,4 +1,4 @@
-"""Commands for the installation: configuration files, benchmark, shell completion."""
+"""Commands for the installation: configuration files, benchmark and shell completion."""
 
 from datetime import datetime
 from pathlib import Path
@@ -95,7 +95,7 @@ def benchmark(
 
     Prints tables and writes benchmark.md and benchmark.json, with machine and versions, and the figure
     work_precision.png. Integrators that are not installed are marked; `uv sync --group benchmark` installs them. The
-    exit code does not depend on the numbers: it is 0, or 2 if an input was refused.
+    exit code does not depend on the numbers: it is 0, or 2 if an input was refused or a timed command failed.
     """
     progress("loading the program")
     from bench.app.benchmark.suite import FULL, QUICK, RESULTS, run_benchmark

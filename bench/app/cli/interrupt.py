@@ -1,8 +1,8 @@
 """Handling of Ctrl-C, SIGTERM and a closed terminal in every phase of a command.
 
 While a rig is open, the first signal ramps the output to zero and ends the run, and the second cuts the output. Without
-an open rig nothing moves, and the first signal raises KeyboardInterrupt. If the main thread cannot handle the signal,
-because it executes native code or waits, another thread ends the process.
+an open rig nothing moves, and the first signal raises KeyboardInterrupt. If the main thread then cannot handle the
+signal, because it executes native code or waits, another thread ends the process.
 """
 
 import os
@@ -213,7 +213,7 @@ def handle_signals(interrupts: Interrupts) -> None:
 
 
 def interrupted_text(text: str = "interrupted", otherwise: str = "") -> str:
-    """Message for an interrupt: `text` with the files that are complete, or with `otherwise` if there are none."""
+    """Message for an interrupt: `text` and the complete result files or, if there are none, `otherwise`."""
     kept = ", ".join(map(str, completed()))
     if not kept:
         return f"{text}; {otherwise}" if otherwise else text

@@ -76,27 +76,27 @@ COMMANDS = {
     ),
     "predict steady": (
         "predict:steady",
-        "Steady motions at single points: gain coefficients, peaks, impacts, Floquet multipliers.",
+        "Steady motions at single points: gain coefficients, peaks, impacts and Floquet multipliers.",
         "--omega 16 --beta 0.4 --json",
     ),
     "predict spectrum": (
         "predict:spectrum",
-        "Gain spectra: alpha_1 and alpha_2 against frequency for each stiffness, both branches.",
+        "Gain spectra: alpha_1 and alpha_2 against frequency for each stiffness, on both branches.",
         "--beta 0.25 0.64 --plot spectrum.png",
     ),
     "predict stability": (
         "predict:stability",
-        "Frequencies of the stability boundaries of the rocking motions, on fixed ground and on a table.",
+        "Frequencies at which rocking motions become stable or unstable, on fixed ground and on a table.",
         "--beta 0.64 0.97 --plot stability.png",
     ),
     "predict attractor": (
         "predict:attractor",
-        "Long-term motions on a table, where the periodic rocking motion is unstable: period, peaks, falls.",
+        "Long-term motions on a table, where the periodic rocking motion is unstable: period, peaks and falls.",
         "--omega 15 --beta 0.64 0.97",
     ),
     "predict map": (
         "predict:gain_map",
-        "Gain maps: alpha_1 and alpha_2 over frequency and stiffness, both branches, with stability.",
+        "Gain maps: alpha_1 and alpha_2 against frequency and stiffness on both branches, with stability.",
         "--csv map.csv --plot map.png",
     ),
     "predict seismic": (
@@ -111,12 +111,12 @@ COMMANDS = {
     ),
     "records info": (
         "records:info",
-        "Describe earthquake records: peaks, Arias intensity, significant duration, hash.",
+        "Describe earthquake records: peaks, Arias intensity, significant duration and hash.",
         "RECORD.AT2 --plot record.png",
     ),
     "records fit": (
         "records_fit:fit",
-        "Fit a record to the stroke and the velocity of the configured bench, starting and ending at rest.",
+        "Fit a record to the stroke and the velocity of the configured bench, with rest at its beginning and end.",
         "RECORD.AT2 --config bench.toml",
     ),
     "report": ("report:report", "Create a report of a campaign from its data file.", "campaign.h5 --pdf report.pdf"),
@@ -132,7 +132,7 @@ COMMANDS = {
     ),
     "file verify": (
         "file:verify",
-        "Check every dataset of a data file against its checksum and against the file layout.",
+        "Check the datasets of a data file against their checksums and against the file layout.",
         "campaign.h5 --json",
     ),
     "file recover": (
@@ -185,7 +185,7 @@ COMMANDS = {
 
 
 def rockbench_app(arguments: Sequence[str] = ()) -> App:
-    """The command tree. Of the commands, only the one that `arguments` name is loaded, or the list of protocols."""
+    """The command tree. Only the command named in `arguments` is loaded; all protocols for `run` without a protocol."""
     app = App(
         name="rockbench",
         help=SUMMARY,
@@ -256,7 +256,8 @@ def _document(command: App) -> None:
 def main(argv: Sequence[str] | None = None, progress: Progress = silent) -> int:
     """Execute a command line and return its exit code; `progress` reports each stage.
 
-    0: done. 1: a run failed or was aborted. 2: refused before anything started. 130: ended by Ctrl-C.
+    0: done. 1: the command failed, or its run failed or was aborted. 2: a RockbenchError, usually an input refused
+    before anything started. 130: ended by Ctrl-C.
     An error is one line on standard error, and with --json an object on standard output (docs/errors.md).
     """
     arguments = sys.argv[1:] if argv is None else list(argv)

@@ -81,7 +81,7 @@ def with_flags(
     model: type[Parameters], title: str, command: Callable[..., int], positional: str | None = None
 ) -> Callable[..., int]:
     """Add a flag for each field of `model` to a command, in the group `title`; the first argument of the command
-    receives the typed values by name.
+    receives a mapping from field names to the typed values.
 
     Values are passed on as text and validated by the model, not by the command-line parser. The field `positional`, a
     list of texts, becomes a positional argument.
@@ -212,7 +212,9 @@ class RunOptions:
     ] = False
     json: Annotated[
         bool,
-        switch("Print only one JSON object on standard output: the summary of the run, or its margins."),
+        switch(
+            "Print only one JSON object on standard output: the summary of the run or, with --dry-run, its margins."
+        ),
     ] = False
 
     @property

@@ -1,4 +1,4 @@
-"""Output of the commands: results as text, JSON, CSV, HDF5 and figure; errors and warnings as lines.  The names of the
+"""Output of the commands: results as text, JSON, CSV, HDF5 and figure; errors and warnings as lines. The names of the
 output files are checked before anything is computed.
 """
 
@@ -146,8 +146,8 @@ def check_files(options: "ResultOptions") -> None:
 def deliver(make: Callable[[], Result], options: "ResultOptions", progress: Progress = silent) -> int:
     """Compute a result, write the requested files, then print.
 
-    Returns 0, or 1 with a line on standard error if the computation or the disk fails or there is nothing to draw (no
-    file is then written). Raises InvalidInput.
+    Returns 0, or 1 with a line on standard error if the computation or the disk fails or there is nothing to draw; in
+    the last case, no file is written. Raises InvalidInput.
     """
     try:
         result = make()

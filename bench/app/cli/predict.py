@@ -58,7 +58,7 @@ _Records = Annotated[
     Parameter(
         name="FILE",
         metavar="FILE",
-        help="Records, before the flags: FILE, FILE@KEY=VALUE,... with the keys unit, dt, channel, column, name, "
+        help="Records, before the flags: FILE, FILE@KEY=VALUE,... with the keys unit, dt, channel, column and name, "
         "or synthetic:NAME[:SEED]. Default: the seven synthetic ones.",
     ),
 ]
@@ -184,39 +184,41 @@ history = _sine(
 steady = _sine(
     SteadyRequest,
     "predict_sine:steady",
-    "Steady motions at single points: gain coefficients, peaks, impacts, Floquet multipliers.\n\nThe "
+    "Steady motions at single points: gain coefficients, peaks, impacts and Floquet multipliers.\n\nThe "
     "periodic motions are solved for directly, without waiting for transients to decay. Up to two exist "
-    "at a point: one in which the block rocks, and one in which it never lifts. Each is listed, and its "
-    "alpha_2 has an uncertainty band: expanded uncertainty (k = 2) to first order, or the 95 % interval of "
-    "a Monte Carlo simulation with --members. The figure shows two periods of each.",
+    "at a point: one in which the block rocks, and one in which it never lifts. Each is listed; with the "
+    "solver taylor, its alpha_2 has an uncertainty band: expanded uncertainty (k = 2) to first order, or the "
+    "95 % interval of a Monte Carlo simulation with --members. The figure shows two periods of each.",
     drawable=MOST_HISTORIES,
 )
 spectrum = _sine(
     SpectrumRequest,
     "predict_sine:spectrum",
-    "Gain spectra: alpha_1 and alpha_2 against frequency for each stiffness, both branches.\n\n"
-    "Every alpha_2 has a band, as in `steady`. The figure is like the paper's Fig. 6, without measurements.",
+    "Gain spectra: alpha_1 and alpha_2 against frequency for each stiffness, on both branches.\n\n"
+    "With the solver taylor, every alpha_2 has a band, as in `steady`. The figure is like the paper's Fig. 6, without "
+    "measurements.",
 )
 gain_map = _sine(
     MapRequest,
     "predict_sine:gain_map",
-    "Gain maps: alpha_1 and alpha_2 over frequency and stiffness, both branches, with stability.\n\n"
+    "Gain maps: alpha_1 and alpha_2 against frequency and stiffness on both branches, with stability.\n\n"
     "The figure is like the paper's Fig. 4: surfaces and contour maps.",
 )
 stability = _sine(
     StabilityRequest,
     "predict_on_table:stability",
-    "Stability boundaries of the rocking motions in frequency, on fixed ground and on a table.\n\nThe block pushes "
-    "the table, which changes how a disturbance grows or decays: a motion may be stable on the table and unstable on "
-    "fixed ground. The drive keeps the table's motion a pure sine up to the harmonic --harmonics, but does not react "
-    "within a period. The boundaries are listed; --csv, --json and --plot contain the multipliers of every point.",
+    "Frequencies at which rocking motions become stable or unstable, on fixed ground and on a table.\n\n"
+    "The block pushes the table, which changes how a disturbance grows or decays: a motion may be stable on the table "
+    "and unstable on fixed ground. The drive keeps the table's motion a pure sine up to the harmonic --harmonics, but "
+    "does not react within a period. The boundaries are listed; --csv, --json and --plot contain the multipliers of "
+    "every point.",
 )
 attractor = _sine(
     AttractorRequest,
     "predict_on_table:attractor",
-    "Long-term motions on a table, where the periodic rocking motion is unstable: period, peaks, falls.\n\nThe motion "
-    "is simulated from the disturbed orbit over --cycles cycles; the drive keeps the table's harmonics at their "
-    "requested values on average. The motion repeats after several cycles, does not repeat, or ends with a fall. "
+    "Long-term motions on a table, where the periodic rocking motion is unstable: period, peaks and falls.\n\n"
+    "The motion is simulated from the disturbed orbit over --cycles cycles; the drive keeps the table's harmonics at "
+    "their requested values on average. The motion repeats after several cycles, does not repeat, or ends with a fall. "
     "The range of the greatest peak and the share of falls are computed with randomly drawn specimens. With many "
     "frequencies, the figure is a bifurcation diagram.",
 )
@@ -224,9 +226,9 @@ seismic = _under_records(
     SeismicRequest,
     "seismic",
     "Gain curves under earthquake records: alpha_1 and alpha_2 against the stiffness.\n\nEach record is trimmed, "
-    "limited to the band of the table, scaled to the peak --peak-factor, and on request fitted to the stroke; motions "
-    "start at rest. For a block that topples, the time of toppling is given instead of a gain. The figure is like the "
-    "paper's Fig. 8(a) and 9(a).",
+    "limited to the table's band, if any, scaled to the peak --peak-factor, and on request fitted to the stroke; "
+    "motions start at rest. For a block that topples, the time of toppling is given instead of a gain. The figure is "
+    "like the paper's Figs. 8(a) and 9(a).",
     drawable=28,
 )
 band_study = _under_records(

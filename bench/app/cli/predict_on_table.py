@@ -1,4 +1,4 @@
-"""Predictions on a table, with their tables, texts and figures: stability boundaries, long-term motions."""
+"""Predictions on a table, with their tables, texts and figures: stability boundaries and long-term motions."""
 
 import sys
 from typing import TYPE_CHECKING

@@ -1,4 +1,4 @@
-"""Predictions under a sine, with their tables, texts and figures: modes, histories, steady motions, spectra, maps."""
+"""Predictions under a sine, with tables, texts and figures: modes, histories, steady motions, spectra and maps."""
 
 import sys
 from collections.abc import Callable, Sequence
@@ -143,7 +143,7 @@ def spectrum(request: SpectrumRequest, subject: Subject, progress: Progress) -> 
 
 
 def gain_map(request: MapRequest, subject: Subject, progress: Progress) -> Result:
-    """Gain maps over frequency and stiffness; with an output file, an interrupted map is continued."""
+    """Gain maps; with an output file and the solver taylor, an interrupted map is continued."""
     from bench.prediction.gain_map import grids, map_table, resting_margin
     from bench.prediction.map_store import MapStore, discard
 

@@ -40,7 +40,8 @@ def queue(
     `rockbench run PROTOCOL ... --queue FILE` adds a test; the operator's window can store its queue in the same format.
     No test starts if one of the plans is refused. A test that fails or is stopped ends the queue; the others stay
     pending, and the same command continues with them. The exit code is 0 if every pending test was carried out, 1 if
-    not, 2 if an input was refused before the first test, 130 after Ctrl-C.
+    not, 2 if an input was refused before the first test, 130 after Ctrl-C. With --dry-run it is 0 unless a plan is
+    refused.
     """
     progress("loading the program")
     from bench.app.cli.inputs import configuration_from

@@ -47,7 +47,7 @@ def info(
     as_json: Json = False,
     progress: Handed = silent,
 ) -> int:
-    """Describe earthquake records: peaks, Arias intensity, significant duration, hash.
+    """Describe earthquake records: peaks, Arias intensity, significant duration and hash.
 
     The format is recognised from the content of the file. Unit and time step must be specified if the file does not
     state them; values that contradict the file are refused, as is a file that is not a complete acceleration record.
@@ -86,7 +86,7 @@ def info(
 
 
 def _content(record: "Accelerogram") -> dict[str, Any]:
-    """Content of a record for JSON, in SI units, which the keys state at their end."""
+    """Content of a record for JSON, in the SI units stated at the end of the keys."""
     from bench.accelerograms.measures import measures
 
     found = measures(record)
@@ -124,7 +124,7 @@ def _text(record: "Accelerogram") -> str:
     from bench.accelerograms.units import STANDARD_GRAVITY
 
     found = measures(record)
-    drift = "" if not found.drifts else "  (baseline drift: PGV and PGD are those of the drift)"
+    drift = "" if not found.drifts else "  (baseline drift, which affects PGV and PGD)"
     facts = {
         "source": record.source,
         "format": f"{record.format}, samples in {record.unit}",

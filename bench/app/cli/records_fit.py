@@ -45,7 +45,7 @@ def _fit(
     as_json: Json = False,
     progress: Handed = silent,
 ) -> int:
-    """Fit a record to the stroke and the velocity of the configured bench, starting and ending at rest.
+    """Fit a record to the stroke and the velocity of the configured bench, with rest at its beginning and end.
 
     The record is scaled in time (--length-ratio), trimmed, limited to a band, scaled to a peak, then fitted: by the
     least change below 2 Hz, by a high-pass filter, or by both for comparison. Stroke, velocity and the change of the
@@ -80,7 +80,7 @@ fit = with_flags(StrokeFitRequest, "Parameters of fit", _fit)
 
 
 def _content(fits: "StrokeFits") -> dict[str, Any]:
-    """Content of the fits for JSON, in SI units, which the keys state at their end."""
+    """Content of the fits for JSON, in the SI units stated at the end of the keys."""
     record = fits.record
     first = fits.chosen.fit
     return {

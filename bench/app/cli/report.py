@@ -39,11 +39,11 @@ def report(
 ) -> int:
     """Create a report of a campaign from its data file.
 
-    One self-contained page: test and specimen, figures like the paper's Figs. 3 to 9 from this file's data, tables with
-    uncertainties, comparison with the prediction, limits and warnings, provenance. Every dataset is compared with its
-    checksum first; damaged ones are listed at the top of the report. Without --html and --pdf, the report is written as
-    HTML next to FILE, with the extension .report.html. The exit code is 0 if it was written, 1 if it could not be
-    written, 2 if an input was refused. Existing files are kept unless --overwrite is given.
+    The report is one self-contained document with the test and the specimen, figures and tables with uncertainties,
+    a comparison with the prediction if there is one, limits, warnings, and provenance. The datasets are compared with
+    their checksums first; damaged ones are listed at the top of the report. Without --html and --pdf, the report is
+    written as HTML next to FILE, with the extension .report.html. The exit code is 0 if it was written, 1 if it could
+    not be written, 2 if an input was refused. Existing files are kept unless --overwrite is given.
     """
     progress("loading the program")
     from bench.app.catalogue import installed_protocol
@@ -111,7 +111,7 @@ def paper(
 ) -> int:
     """Reproduce the paper from simulation alone, statement by statement.
 
-    Draws the figures of the paper (Fig. 3 to 9), checks its eight statements numerically, and prints the verdicts.
+    Draws the figures of the paper (Figs. 3 to 9), checks its eight statements numerically, and prints the verdicts.
     Without --html and --pdf, the report is written as paper.html in the current folder. The exit code is 0 if the
     report was written, whatever the verdicts, 1 if it could not be written, 2 if an input was refused. Existing files
     are kept unless --overwrite is given.

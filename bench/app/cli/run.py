@@ -1,4 +1,4 @@
-"""`rockbench run <protocol>`: checks the inputs and the plan, runs the session, reports how the session ended."""
+"""`rockbench run <protocol>`: checks the inputs and the plan, runs the session, and reports how it ended."""
 
 import sys
 from collections.abc import Callable, Mapping
@@ -29,8 +29,8 @@ GOOD = ("completed", "stopped")
 
 _EXIT_CODES = (
     "The exit code is 0 if the campaign was carried out (even if a point was not reached, see its "
-    "status), 1 if it failed or was aborted, 2 if it was refused before it began, 130 after Ctrl-C. With "
-    "--dry-run it is 0 if the campaign would be carried out."
+    "status), 1 if it failed, was aborted or did not pass a check, 2 if it was refused before it began, 130 "
+    "after Ctrl-C. With --dry-run it is 0 if the campaign would be carried out, 2 if it would be refused."
 )
 
 

@@ -56,7 +56,7 @@ class PlainLines:
 
 
 class LogLines(PlainLines):
-    """Writes one line for each event, and each completed point in the log format of `protocol`."""
+    """Writes one line for each event of the log, and each completed point in the log format of `protocol`."""
 
     _stage = "plan: "
 
@@ -138,7 +138,7 @@ def choose(*, serves_itself: bool, yes: bool, ask: bool, terminal: bool) -> Oper
     """The operator of a run.
 
     A bench that `serves_itself` performs the operator's actions, unless `ask` is set. On a real bench, the person at
-    the `terminal` is asked, unless `yes` is set. Raises RockbenchError if nobody could answer.
+    the `terminal` is asked, unless `yes` is set. Raises RockbenchError if nobody could answer, or for `yes` with `ask`.
     """
     if yes and ask:
         raise RockbenchError("--yes and --ask contradict each other: use only one of them")

@@ -117,7 +117,7 @@ class Ring:
 
 
 class BlockAngle:
-    """Angle of the block over bench time, as computed and published by the live twin."""
+    """Angle of the block against bench time, as computed and published by the live twin."""
 
     def __init__(self) -> None:
         self._run, self._origin = 0, 0.0

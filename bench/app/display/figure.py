@@ -44,7 +44,7 @@ class Curve:
 
 @dataclass(frozen=True)
 class Figure:
-    """Curves over common axes; `notice` states what will appear, and is empty once there is a result."""
+    """Curves on common axes; `notice` announces the expected contents, and is empty once there is a result."""
 
     title: str
     x_label: str

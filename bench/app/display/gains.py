@@ -164,7 +164,9 @@ class Difference:
 
     @property
     def score(self) -> float:
-        """|difference| over its uncertainty, the E_n score of ISO 13528: above 1, the runs differ. NaN if unknown."""
+        """|difference| divided by its uncertainty, the E_n score of ISO 13528: above 1, the runs differ significantly.
+        NaN if unknown.
+        """
         return abs(self.value) / self.uncertainty if self.uncertainty > 0.0 else nan
 
 

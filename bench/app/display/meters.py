@@ -14,11 +14,13 @@ from sim.channel import STOREYS
 SPAN = 2.0
 """Length [s] of each of the two consecutive windows whose peaks give the growth of a quantity."""
 GROWTH, NEAR = 0.02, 0.3
-"""Least relative growth between the windows, and least share of the limit, for which a time to the limit is stated."""
+"""Smallest relative growth between the windows, and smallest fraction of the limit, for which a time to the limit is
+stated.
+"""
 SOON = 60.0
 """Longest stated time to a limit [s]."""
 WARNED = 0.9
-"""Share of its limit at or above which a quantity without a declared warning level is marked."""
+"""Fraction of its limit at or above which a quantity without a declared warning level is marked."""
 HIDDEN = ("drive_voltage", "drive_slew")
 """Limits without a meter: they apply to the command, which is checked before output, not to a measured signal."""
 

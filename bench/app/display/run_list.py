@@ -74,7 +74,7 @@ class RunRow:
 
     @property
     def searched(self) -> str:
-        """Text in which a search looks for words, in lower case."""
+        """All texts of the row, in lower case, for a search."""
         return "\n".join((*self.cells, *self.tips)).lower()
 
 

@@ -1,4 +1,4 @@
-"""Samples of channels of recorded runs: intervals at screen resolution, values at given times, amplitude spectra."""
+"""Samples of channels of recorded runs: intervals at screen resolution, values at given times and amplitude spectra."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

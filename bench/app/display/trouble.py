@@ -1,4 +1,4 @@
-"""Fault reports for the operator: event, reaction of the bench, next step."""
+"""Fault reports for the operator: event, reaction of the bench and next step."""
 
 from dataclasses import dataclass
 
@@ -21,7 +21,7 @@ KEPT = "The data recorded until then are in {out}."
 DID_REFUSE = "The run was not started: nothing was armed or written."
 DID_NOT_START = "The rig was never armed; all devices were closed again."
 DID_LOSE = (
-    "The output is brought to zero whenever a session ends; if its process crashed, by the watchdog and the heartbeat "
+    "A session that ends brings the output to zero; if its process crashed, only the watchdog or the heartbeat does, "
     "where they are configured. The data recorded until then remain readable."
 )
 NOW_REFUSED = "Change the value named above, then check the plan again."

@@ -1,1 +1,1 @@
-"""Recorded campaigns for other programs: MATLAB, text, Universal File Format, Parquet."""
+"""Export of recorded campaigns for other programs: MATLAB, CSV, Universal File Format and Parquet."""

@@ -34,7 +34,7 @@ Kind = Literal["number", "whole", "switch", "text"]
 class Signal:
     """One column of samples: a channel or the drive. `read` returns the samples in a slice of rows of the file.
 
-    For raw counts, `conversion` describes the conversion to physical values; its entry `value_unit` is their unit.
+    For raw counts, `conversion` describes the conversion to physical values, whose unit is its entry `value_unit`.
     """
 
     name: str

@@ -21,7 +21,7 @@ def headed(name: str, unit: str) -> str:
 
 
 def write(content: Content, folder: Path) -> None:
-    """Write every run and table as text with decimal points and separating commas; missing samples are `nan`."""
+    """Write every run and table as comma-separated text with decimal points; missing samples are `nan`."""
     write_channels(content.signals, folder / CHANNELS)
     headings = [headed("time", "s"), *(headed(signal.name, signal.unit) for signal in content.signals)]
     formats = [f"%.{DIGITS}g", *("%d" if signal.dtype.kind == "i" else f"%.{DIGITS}g" for signal in content.signals)]

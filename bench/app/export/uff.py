@@ -1,8 +1,8 @@
 """Universal File Format: one file per run with a dataset 58 (binary) for each signal; tables, which UFF lacks, are
 written as text.
 
-The format has no missing values, and pyuff writes 0 for them, so a signal is split where samples are missing or
-invalid, and each part is a separate dataset.
+The format cannot represent missing values, and pyuff writes 0 for them, so a signal is split where samples are missing
+or invalid, and each part is a separate dataset.
 """
 
 import shutil
@@ -72,7 +72,7 @@ def _units(pyuff: Any) -> dict[str, Any]:
 
 
 def _parts(signal: Signal, values: NDArray[Any], time: NDArray[np.float64], rate: float) -> Iterator[tuple[int, int]]:
-    """Uninterrupted parts of the signal as index ranges [start, stop) of at least two samples each."""
+    """Uninterrupted parts of the signal as index ranges [start, stop); parts of a single sample are omitted."""
     good = np.isfinite(values)
     # the sample after a gap in time begins a new part
     follows = np.concatenate(([False], np.diff(time) < 1.5 / rate))

@@ -1,4 +1,4 @@
-"""Background work: functions in a thread or in the reading process, commands in a separate process."""
+"""Background work: functions in a thread or in the reading process, and commands in a separate process."""
 
 import shutil
 import subprocess
@@ -66,7 +66,7 @@ class Reader(QObject):
             if self._busy:
                 return
             self._busy = True
-        # no QThreadPool: its deletion waits for its threads, for ever if the window's thread holds Python's GIL
+        # no QThreadPool: its deletion waits for its threads, indefinitely if the window's thread holds Python's GIL
         thread = Thread(target=self._work, daemon=True)
         _threads.add(thread)
         thread.start()

@@ -1,4 +1,4 @@
-"""Table of the lines of a check: passed, failed and pending."""
+"""Table of the lines of a check with their verdicts."""
 
 from PySide6.QtGui import QColor
 from PySide6.QtWidgets import (

@@ -31,13 +31,13 @@ from bench.app.ipc.sessions import RunningSession
 from drivers.clock import now
 
 PERIOD = 28
-"""Redraw interval [ms], for 35 redraws per second; also the longest interval between checks of the connection."""
+"""Redraw interval [ms], for about 35 redraws per second; also the longest interval between checks of the connection."""
 
 BUDGET = 0.02
 """Maximum time for handling messages in one iteration of the main loop [s]; the others wait for the next iteration."""
 
 DELIBERATE = 0.7
-"""Time after the first press of STOP during which further presses are ignored [s], because of double clicks."""
+"""Time after the first press of STOP [s] during which further presses are ignored: a double click counts once."""
 
 
 class Controller(QObject):
@@ -58,7 +58,7 @@ class Controller(QObject):
     plan_checked = Signal(object, object)
     """Emits the result of `check_plan`, a `PlanChecked` or a `Refused`, and the object that requested it."""
     began = Signal(object)
-    """Emits the `Run` that was just started."""
+    """Emits the `Run` that was just started, or to which the window was just attached."""
     ended = Signal(object)
     """Emits the end of the run: an `Ended` or a `Refused`."""
     _message_received = Signal()

@@ -207,8 +207,8 @@ class RunOptions(QWidget):
         self.use(configuration)
 
     def use(self, configuration: BenchConfiguration) -> None:
-        """Use this configuration, and reset real time and questions to its defaults: the operator answers unless the
-        bench can perform all operator tasks itself.
+        """Use this configuration. Real time is then selected, and the operator answers the questions unless the bench
+        can perform all operator tasks itself.
         """
         self._configuration = configuration
         self.realtime.setChecked(True)

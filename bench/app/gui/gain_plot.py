@@ -35,7 +35,7 @@ GROUND = 150
 class GainPlot(pg.PlotWidget):
     """Gain plot with one colour and line style for each stiffness or record, and one symbol for each run.
 
-    The gain axis of a spectrum is logarithmic, so that 1/5 and 5 are equally visible.
+    The gain axis of a spectrum is logarithmic, so that gains of 1/5 and 5 are at the same distance from 1.
     """
 
     def __init__(self, theme: Theme) -> None:

@@ -1,4 +1,4 @@
-"""The header, always visible: state of the bench, safety inputs, times, step, and STOP."""
+"""The header, always visible: state of the bench and STOP and, as the window size allows, times, step and inputs."""
 
 from collections.abc import Callable
 from typing import cast

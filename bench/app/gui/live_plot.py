@@ -22,11 +22,11 @@ INSIDE = (60, 8, 8, 44)
 KEYS = {"line": "──", "points": "●", "predicted": "╌╌"}
 """Symbols of the legend, by style of the curve."""
 LEGEND = 4
-"""Largest number of curves in the legend; the tooltip has all of them."""
+"""Largest number of curves in the legend; the tooltip lists all of them."""
 
 
 class LivePlot(QWidget):
-    """Axes with the curves of a panel; until there is a result, a notice states what will appear."""
+    """Axes with the curves of a panel; until there is a result, a notice announces the expected contents."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()

@@ -85,7 +85,7 @@ class LiveViewArea(QWidget):
             self.gains.add(event.point.model_dump())
 
     def draw(self) -> None:
-        """Draw what has changed since the last call; panels at most once in `INTERVAL`."""
+        """Draw the changes since the last call; the panels are drawn at most once in `INTERVAL`."""
         if self._running is not None and not self.gains.isHidden():
             self.gains.show_running(self._running)
             self._running = None

@@ -19,7 +19,9 @@ LEAST_ROW, LARGEST_ROW = 30, 52
 
 
 class MetersView(QWidget):
-    """The meters, one below the other: a bar up to the limit, a line at the peak, a triangle at the planned value."""
+    """The meters, one below the other, each with a bar of the magnitude, a line at the peak, and a triangle at the
+    planned value.
+    """
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()

@@ -20,11 +20,11 @@ from bench.live_values import TWIN_TRACE, TwinEstimate
 Kind = Literal["spectrum", "phase", "Poincaré"]
 KINDS: tuple[Kind, ...] = ("spectrum", "phase", "Poincaré")
 SECONDS: dict[Kind, float] = {"spectrum": 20.0, "phase": 3.0, "Poincaré": 60.0}
-"""Length of the displayed motion, by kind of plot [s]."""
+"""Duration of the displayed motion, by kind of plot [s]."""
 HIGHEST = 10.0
 """Highest displayed frequency [Hz]."""
 MODELLED = 3.0
-"""Length of the displayed motion of the live model [s]."""
+"""Duration of the displayed motion of the live model [s]."""
 SMOOTH = np.full(5, 0.2)
 """Weights of the moving average of the drift over bins, from which the velocity is computed: within one bin, the noise
 of the lasers exceeds the motion.

@@ -79,7 +79,7 @@ class FileList(QListWidget):
         return self._place(path) is not None
 
     def tick(self, path: Path, *, on: bool) -> None:
-        """Tick or untick an open file; it is also selected if no file is."""
+        """Tick or untick an open file; if no file is selected, it is also selected."""
         if (row := self._place(path)) is not None:
             self.item(row).setCheckState(Qt.CheckState.Checked if on else Qt.CheckState.Unchecked)
             if self.currentRow() < 0:

@@ -51,7 +51,7 @@ TASKS = {
     ),
     OperatorTask.UNLOCK_TABLE: (
         f"The table must be free before it is driven again. {_AT_ZERO}",
-        _NOT_CHECKED.format(what="Driving the table against its clamp overloads the shaker."),
+        _NOT_CHECKED.format(what="Driving the table against its clamp can overload the shaker."),
     ),
     OperatorTask.WATCH_BLOCK: (
         f"Laser 2 measures the rocking of the block. {_AT_ZERO}",

@@ -24,7 +24,7 @@ class PresetBar(QWidget):
     """
 
     filled = Signal(object)
-    """Emits unvalidated values for the form, by parameter; for an absent one, the default applies."""
+    """Emits unvalidated values for the form, by parameter name; absent parameters have their defaults."""
 
     def __init__(self, folder: Path | None) -> None:
         super().__init__()

@@ -74,7 +74,7 @@ class QueueRunner(QObject):
 
     @property
     def checking(self) -> int | None:
-        """Index of the test whose plan is being checked."""
+        """Index of the test whose plan is being checked; None if there is none."""
         return None if self._check.test is None else self._place(self._check.test)
 
     def close(self) -> None:

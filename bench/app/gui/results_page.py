@@ -46,7 +46,7 @@ from bench.results import FILE
 
 
 class ResultsPage(QWidget):
-    """Two views: the list of all runs, and the results of the opened runs, which are drawn together for ticked runs."""
+    """Two views: the list of all runs, and the results of the opened runs, of which those ticked are drawn together."""
 
     def __init__(self, controller: Controller, theme: Theme) -> None:
         super().__init__()

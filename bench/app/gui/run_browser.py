@@ -124,7 +124,7 @@ class RunBrowser(QWidget):
         self._reader.call(partial(list_runs, self.folder))
 
     def compare(self, compared: Sequence[Path]) -> None:
-        """Mark the compared runs, of which the reference is the first; paths are without links."""
+        """Mark the compared runs, given by paths without links; the first one is the reference."""
         self._compared = list(compared)
         self._mark()
         self._say()
@@ -172,7 +172,7 @@ class RunBrowser(QWidget):
         self._say()
 
     def _mark(self) -> None:
-        """Mark the compared runs by their paths in the list."""
+        """Mark the compared runs in the list, whose paths below `folder` may be relative."""
         inside = [(each, each.is_relative_to(self._real)) for each in self._compared]
         self.model.compare([self.folder / path.relative_to(self._real) if own else path for path, own in inside])
 

@@ -101,7 +101,7 @@ class RunModel(QAbstractTableModel):
         self._repaint()
 
     def use(self, found: Sequence[Found]) -> list[Found]:
-        """List these files; returns those to be read, the last changed first."""
+        """List these files; returns those to be read, in the same order."""
         self._found = {each.path: each for each in found}
         self._rows = {path: row for path, row in self._rows.items() if path in self._found}
         self.arrange()

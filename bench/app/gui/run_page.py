@@ -85,7 +85,7 @@ class RunPage(QWidget):
         self.live.predict(prediction)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        """Limit the height of the verdict to a share of that of the page."""
+        """Limit the height of the verdict to a fraction of the height of the page."""
         super().resizeEvent(event)
         self.verdict.allow(max(self.height(), LOWEST))
 

@@ -1,6 +1,6 @@
 # pyright: reportUnknownMemberType=false, reportUnknownVariableType=false, reportUnknownArgumentType=false
 # pyright: reportMissingTypeStubs=false
-"""Plots of several lines over a common axis, one plot for each unit, with two cursors."""
+"""Plots of several lines with a common horizontal axis, one plot for each unit, with two cursors."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -45,8 +45,8 @@ class Line:
 
 
 class SamplePlot(pg.GraphicsLayoutWidget):
-    """Lines over a common horizontal axis, in stacked plots, one for each unit; the wheel zooms, dragging pans. Keys
-    select a cursor and move it from sample to sample.
+    """Lines with a common horizontal axis, in stacked plots, one for each unit; the wheel zooms, and dragging pans.
+    Keys select a cursor and move it from sample to sample.
     """
 
     range_changed = Signal()

@@ -24,7 +24,7 @@ class Place:
 
 class Tour(QFrame):
     """The guided tour. It performs no step itself, and stays at each one until the user has done it; the control of the
-    step is framed, and *Show me* opens its page.
+    current step is framed, and *Show me* opens its page.
     """
 
     def __init__(self, controller: Controller) -> None:

@@ -31,7 +31,7 @@ units.
 
 
 class TracePlot(QWidget):
-    """Stacked curves over a common time axis: five standard signals and each further signal of the rig. Samples arrive
+    """Stacked curves with a common time axis: five standard signals and each further signal of the rig. Samples arrive
     in blocks; between blocks the axis advances with the clock, so that the curves scroll evenly and every sample is
     shown on arrival.
     """

@@ -1,4 +1,4 @@
-"""Row of controls with which the following runs use a result of the selected run."""
+"""Row of controls to use a result of the selected run for the following runs."""
 
 from collections.abc import Mapping
 from functools import partial

@@ -15,7 +15,7 @@ STRETCH = 80
 UNBROKEN = 24
 """Greatest length of a part of the sentence that is kept on one line [characters]."""
 SPACE = 0.31
-"""Largest share of the page's height that the sentence may occupy."""
+"""Largest fraction of the page's height that the sentence may occupy."""
 FLAGS = int(Qt.TextFlag.TextWordWrap | Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignLeft)
 
 

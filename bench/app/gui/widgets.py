@@ -1,5 +1,5 @@
 # pyright: reportUnknownMemberType=false
-"""Shared parts of the pages: lamp, keys of buttons, levels of labels, axes of plots, the file dialog."""
+"""Shared parts of the pages: lamp, keys of buttons, levels of labels, axes of plots, and the file dialog."""
 
 from collections.abc import Callable
 from math import floor, log10

@@ -1,4 +1,4 @@
-"""The operator's window, which consists of the header with STOP, panels and pages; and Qt's main loop."""
+"""The operator's window, with the header, the panels and the pages, and Qt's main loop."""
 
 import signal
 import sys

@@ -1,4 +1,4 @@
-"""Announcement of a session to the windows on this computer, and the listener through which they attach."""
+"""Announcement of a session to clients on this computer, and the listener through which they attach."""
 
 import json
 import os
@@ -22,8 +22,8 @@ from sim import waiting
 @contextmanager
 def announced(server: SessionServer, run: Run, owner: str) -> Generator[None]:
     """Context manager in which clients can attach to the session of `server`, which carries out `run` for its `owner`,
-    "window" or "terminal". If the session cannot be announced, a warning is published and the owner remains the only
-    client.
+    "window" or "terminal". Without a folder for announcements, the owner remains the only client, as after an error,
+    which is published as a warning.
     """
     folder = sessions_folder()
     if folder is None:

@@ -1,4 +1,4 @@
-"""The client's side of the connection: starts the session process, sends requests, buffers the session's messages."""
+"""The client's side of the connection: starts the session process, sends requests and buffers incoming messages."""
 
 import json
 import secrets

@@ -297,7 +297,7 @@ relative to the table [m] and the drift, their difference [m]. Further channels 
 """
 
 BIN = 0.002
-"""Length of a bin [s] before rounding to whole samples: less than a pixel in any plot of a second or longer."""
+"""Length of a bin [s] before rounding to whole samples."""
 
 
 def extremes(values: NDArray[np.float64], width: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:

@@ -52,7 +52,7 @@ def serve(connection: Connection) -> None:
             last = _check_plan(assignment)
     except KeyboardInterrupt:
         host.close(Refused(f"ended before anything moved: {requests.reason}", requests.cause), FAREWELL)
-        # a normal exit would call the destructors of what was broken off
+        # a normal exit would call the destructors of the objects of an interrupted call
         os._exit(0)
     except InvalidInput as error:
         last = Refused(str(error), error.cause)

@@ -1,4 +1,4 @@
-"""The session's side of the connection: sends events and traces, handles requests, detects the loss of the client."""
+"""The session's side of the connection: sends events and traces, handles requests and detects a lost client."""
 
 import signal
 import threading
@@ -92,7 +92,7 @@ answer.
 
 
 class SessionServer:
-    """Serves the clients of a session, each by a sending and a receiving thread; the engine waits for none of them.
+    """Serves the clients of a session, each with a sending and a receiving thread; the engine waits for none of them.
 
     owner : connection to the client that started the session; None for a session that a terminal started.
     lost : called with the reason, in a receiving thread, when the owner has disconnected or is silent; may be called

@@ -48,8 +48,8 @@ class RunningSession:
 
 
 def sessions_folder() -> Path | None:
-    """Folder of the announcements, created if missing; None if announcements are disabled, or if other users could
-    write to the folder.
+    """Folder of the announcements, created if missing; None if announcements are disabled, or if the folder cannot be
+    created or is accessible to other users.
     """
     given = os.environ.get(FOLDER)
     if given == "off":

@@ -28,7 +28,7 @@ class Stage(StrEnum):
     RUNNING = "running"
     DONE = "done"
     FAILED = "failed"
-    """The test was refused or did not complete."""
+    """The test was refused, did not complete, or did not pass."""
     SKIPPED = "skipped"
 
 
@@ -125,8 +125,8 @@ class Queue:
         self._change([*self._tests[:index], *self._tests[index + 1 :]])
 
     def move(self, index: int, by: int) -> int:
-        """Move a pending test down by `by` places (up if negative), at most to the end of the list; returns its new
-        index.
+        """Move a test that has not begun down by `by` places (up if negative), at most to the end of the list; returns
+        its new index.
         """
         test = self._open(index, "moved")
         rest = [*self._tests[:index], *self._tests[index + 1 :]]
@@ -206,7 +206,7 @@ def queued(protocol: "Protocol[Any]", parameters: Parameters, out: Path | None, 
 
 
 def ready(test: Queued, number: int, configuration: "BenchConfiguration") -> Ready:
-    """Check the parameters of a test against the bench, and its folder. Raises InvalidInput that names the test."""
+    """Check a test: its parameters against the bench, and its folder. Raises InvalidInput that names the test."""
     try:
         protocol = load_protocol(test.protocol)
         parameters = validated(protocol.parameters, test.parameters, dotted)
@@ -219,8 +219,8 @@ def ready(test: Queued, number: int, configuration: "BenchConfiguration") -> Rea
 
 
 def all_ready(tests: Sequence[Queued], configuration: "BenchConfiguration") -> Mapping[int, Ready]:
-    """All pending tests, checked, by index. Raises InvalidInput for the first that cannot run, and for a folder used by
-    two tests.
+    """Check all pending tests; returns them by index. Raises InvalidInput for the first that cannot run, and for a
+    folder used by two tests.
     """
     found: dict[int, Ready] = {}
     folders: dict[Path, int] = {}

@@ -1,1 +1,1 @@
-"""Reports: on a campaign from its data file, and on the paper from simulation."""
+"""Reports on a campaign, from its data file, and on the paper, from simulation."""

@@ -1,4 +1,4 @@
-"""Section of a report on the limits: warnings, margins, values of the limits."""
+"""Section of a report on the limits: warnings, margins and values of the limits."""
 
 from collections.abc import Iterator
 
@@ -49,8 +49,8 @@ def limits_section(campaign: Campaign) -> Section:
     parts.append(
         "Limits of the model: a rigid block that neither slides nor leaves the table, Housner's impact law, "
         "a shear frame with linear springs and "
-        f"dashpots{', a pure sine' if campaign.harmonic_points else ''}. Limits of the measurement: the "
-        "motion of the block is not measured; it is known only from the model and from the first storey."
+        f"dashpots{', a pure sine' if campaign.harmonic_points else ''}. Limits of the measurement: while no laser "
+        "points at the block, its motion is known only from the model and from the first storey."
     )
     parts += list(_margins(campaign))
     if campaign.configuration is not None:

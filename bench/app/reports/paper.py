@@ -153,8 +153,8 @@ class _Paper:
         parts: list[Part] = [
             *_of_what(self._request.records),
             f"Every record is scaled to a peak of {peak:.4g} m/s² (1.2 g/λ), without a change of its time scale, both "
-            f"unfiltered and limited to the band of a long-stroke shaker, {self._band}. Motions start from rest; a "
-            "block that topples has no gain. Statement 8 is checked on both.",
+            f"unfiltered and limited to the band of the table, {self._band}. Motions start from rest; a block that "
+            "topples has no gain. Statement 8 is checked on both.",
         ]
         parts.append(motions_table([curve for curves in self._curves.values() for curve in curves]))
         for words, curves in self._curves.items():
@@ -164,7 +164,7 @@ class _Paper:
 
 
 def paper_report(request: PaperRequest, progress: Progress = silent) -> tuple[Document, list[Named]]:
-    """The report, and the statements if requested. Raises InvalidInput for a record that cannot be prepared,
+    """The report, and the statements if requested. Raises InvalidInput for a record that cannot be prepared, and
     RockbenchError if no motion is found.
     """
     load_model(progress)

@@ -105,7 +105,7 @@ def modes_section(specimen: Specimen, betas: Sequence[float]) -> Section:
         "modes",
         "Modes (as in Fig. 3 of the paper)",
         [
-            "Modes of the bare frame and of the linearised coupled system, Eq. 12 to 14, without damping." + note,
+            "Modes of the bare frame and of the linearised coupled system, Eqs. 12 to 14, without damping." + note,
             Table("Modes (predicted, from the specimen's nominal values; shapes scaled to u₁ = 1)", columns, rows),
             Picture(
                 modes_figure(arrays(table), specimen),

@@ -28,7 +28,7 @@ COMMANDS = {
 
 @contextmanager
 def awake(system: str = sys.platform) -> Generator[bool]:
-    """Context manager that keeps the computer from going to sleep; yields whether this is possible."""
+    """Context manager that keeps the computer from going to sleep; yields whether the request was accepted."""
     if system == "win32":
         with _thread_required(_windows_state()) as required:
             yield required

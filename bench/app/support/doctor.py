@@ -24,9 +24,10 @@ LATE = 0.005
 SPEED = 20e6
 """Minimum write speed of the disk [B/s], many times the data rate of a run."""
 ROOM = 5e9
-"""Free space required for a day of runs [B]."""
+"""Smallest acceptable free space [B]."""
 LATENCY = 1
-"""Largest acceptable latency timer of a serial adapter [ms]; the default of 16 ms delays the readings of a laser."""
+"""Largest acceptable latency timer of a serial adapter [ms]; the usual default, 16 ms, delays the readings of a laser.
+"""
 
 
 class Health(StrEnum):
@@ -74,7 +75,7 @@ def examine(folder: Path, port: str | None = None) -> Iterator[Finding]:
 
 
 def versions() -> Finding:
-    """Check the version of Python, which must have 64 bits; the finding also lists the versions of the libraries."""
+    """Check that Python is recent and has 64 bits; the finding also lists the versions of the libraries."""
     versions = ", ".join(f"{name} {version}" for name, version in software().items())
     good = sys.version_info[:2] >= OLDEST and sys.maxsize > 2**32
     remedy = "" if good else f"install a 64-bit Python, {OLDEST[0]}.{OLDEST[1]} or newer"
@@ -199,7 +200,7 @@ def _read(path: Path) -> str:
 
 
 def serial_ports(adapters: Path = Path("/sys/bus/usb-serial/devices"), devices: Path = Path("/dev")) -> Finding:
-    """Check the latency timers of serial adapters, and the permission to open their ports."""
+    """Check the latency timers of serial adapters, and the permission to open their ports; on Linux only."""
     item, found = "serial ports", sorted(adapters.glob("*")) if adapters.is_dir() else []
     if not found:
         return Finding(item, Health.GOOD, "no serial adapter")
@@ -214,7 +215,7 @@ def serial_ports(adapters: Path = Path("/sys/bus/usb-serial/devices"), devices: 
 
 
 def opengl(cards: Path = Path("/dev/dri")) -> Finding:
-    """Check whether the window is installed and a graphics card is present."""
+    """Check whether the window is installed and, on Linux, whether a graphics card is present."""
     if importlib.util.find_spec("PySide6") is None:
         return Finding(
             "OpenGL", Health.NOTICE, "the window is not installed", "to use the window, install the extra gui"

@@ -7,7 +7,7 @@ from sim.kernel.compiled import compiled, generic
 from sim.kernel.lanes import fma, get, put
 
 CHAINS = 12
-"""Independent recurrences: more than a core has multiply-adds in progress at once."""
+"""Number of independent recurrences, more than the multiply-adds that a usual core has in progress at once."""
 
 
 @generic

@@ -158,7 +158,7 @@ def test_cosmos_of_a_velocity_or_of_raw_counts(refuse: Refuse) -> None:
     velocity = next(k for k, line in enumerate(lines) if line.startswith("Corrected velocity"))
     assert "no acceleration" in refuse(lines[velocity:])
     assert "counts" in refuse(writers.cosmos({"Up": f10()}, "0.005", "(8F10.5)", unit="counts (50)"))
-    assert "time step, is unknown" in refuse(writers.cosmos({"Up": f10()}, "-999.000000", "(8F10.5)"))
+    assert "time step, is missing or not positive" in refuse(writers.cosmos({"Up": f10()}, "-999.000000", "(8F10.5)"))
 
 
 def test_a_header_that_does_not_say_what_it_must(refuse: Refuse) -> None:
