@@ -55,7 +55,7 @@ def test_a_sensor_that_never_stops_streaming_is_refused() -> None:
     denied = (b"OUTPUT NONE", b"E202 Access denied\r\n->")
     with (
         Peer([denied, denied, denied, (b"GETINFO", INFO)]) as peer,
-        pytest.raises(CommandRefused, match="refused OUTPUT NONE: E202 Access denied; select the professional user level"),
+        pytest.raises(CommandRefused, match="refused OUTPUT NONE: E202 Access denied; select the professional"),
     ):
         SerialLaser("laser_1", peer.path, baud=921_600, rate=4000.0, measuring_range=0.2)
 
