@@ -219,7 +219,7 @@ def follow(origin: Floats, x: Floats, target: Floats) -> Solution | None:
 
 
 def extrapolated(places: Sequence[float], values: Sequence[Floats], place: float) -> Floats:
-    """Value at `place` of the polynomial through the last of the known `values`, of any shape (Lagrange)."""
+    """Value at `place` of the Lagrange polynomial through the last MOST_KNOWN of `values`, of any shape."""
     near, last = places[-MOST_KNOWN:], values[-MOST_KNOWN:]
     total = np.zeros_like(last[0])
     for at, value in zip(near, last, strict=True):

@@ -30,7 +30,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Pulse:
-    """Velocity pulse near a fault: period [s], amplitude [m/s], number of half cycles gamma, phase nu [rad]."""
+    """Near-fault velocity pulse: period [s], amplitude [m/s], number of half cycles gamma, phase nu [rad]."""
 
     period: float
     velocity: float

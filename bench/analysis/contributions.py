@@ -29,7 +29,7 @@ _DECAYS = "record more decays"
 _CLOCK = "calibrate the sample clock against a reference"
 
 SOURCES: Mapping[str, Source] = {
-    LINEARITY: Source("B", "data sheet or calibration, limited by the test of the bare frame", _CALIBRATE),
+    LINEARITY: Source("B", "data sheet or calibration, constrained by the test of the bare frame", _CALIBRATE),
     SCALES: Source("B", "assumed difference between the lasers' scales, or calibration", _CALIBRATE),
     TIMING: Source("B", "assumed wander of the delay: one measuring period", _FASTER),
     STEPS: Source("B", "resolution of the lasers", _FINER),

@@ -204,7 +204,7 @@ def _maximum(signal: Array, known: NDArray[np.bool_], place: int, half: int, sig
     at, along = top**order @ inverse, (order * top ** np.maximum(order - 1, 0)) @ inverse
     value = sign * float(polynomial(top))
     if bend(top) * sign < 0.0:
-        # an extremum whose position is shifted by noise is higher than the true one
+        # noise shifts the position of the extremum, so that its magnitude is overestimated on average
         value -= 0.5 * sigma**2 * float(along @ along) / abs(float(bend(top)))
     return _Maximum(value, sigma * float(np.linalg.norm(at)), place + top * half, sign)
 

@@ -85,8 +85,7 @@ def open_to_extend(path: Path) -> AbstractContextManager[File]:
 
 def open_to_read(path: Path) -> File:
     """Open a finished file, one being written, or one left by a killed writer."""
-    # in single-writer mode HDF5 retries reading damaged data for hours, so only files that were not closed are opened
-    # in it
+    # in SWMR mode HDF5 may retry for hours to read damaged data, so only files that were not closed are opened in it
     if not is_let_go(path):
         return cast(File, open_living(path))
     return cast(File, h5py.File(path, "r", libver=VERSIONS, locking=locking()))
@@ -98,7 +97,7 @@ def open_to_judge(path: Path) -> File:
 
 
 def is_hdf5(path: Path) -> bool:
-    """Whether the file has the signature of an HDF5 file, at one of its possible places."""
+    """Whether the file has the HDF5 signature at one of the offsets that the format allows."""
     # not by HDF5, which holds Python's lock while a disk stalls
     place = 0
     with suppress(OSError), path.open("rb") as file:

@@ -1,6 +1,7 @@
 # pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
 # pyright: reportUnknownArgumentType=false
-"""Access to members and attributes through h5py's low-level interface, in a third of the time of its dictionaries.
+"""Access to members and attributes through h5py's low-level interface, in a third of the time of its
+dictionary-like interface.
 
 A file has about 200 objects and 600 attributes, which are read whenever it is opened.
 """

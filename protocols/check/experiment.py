@@ -128,7 +128,9 @@ def _steps(parameters: CheckParameters, configuration: BenchConfiguration) -> Ge
     yield from _publish(safety_lines(configuration))
     resting = list(resting_lines(at_rest, parameters, configuration.analysis))
     if at_rest.violation is not None and all(line.verdict is not Verdict.FAILED for line in resting):
-        resting.append(failed("table", "rest", f"{at_rest.violation} at zero drive: check amplifier and limits"))
+        resting.append(
+            failed("table", "rest", f"{at_rest.violation} at zero drive: check the amplifier and the limits")
+        )
     yield from _publish(resting)
     yield from _publish(input_lines(at_rest.channels))
     yield from _publish(alignment_lines(at_rest.alignments, configuration))

@@ -86,5 +86,5 @@ def _remark(found: dict[str, Any], agrees: bool | None) -> str:
     repeats = f"repeats every {found['repeats']} cycles" if found["repeats"] else "does not repeat"
     text = f"the model's free motion {repeats}, with peaks up to alpha_2 = {found['greatest']:.3f}"
     if found["low"] is not None:
-        text += f", between {found['low']:.3f} and {found['high']:.3f} for 95 % of the specimens within the uncertainty"
+        text += f" ({found['low']:.3f} to {found['high']:.3f} for 95 % of the drawn specimens)"
     return text if agrees is not False else f"{text}; the measured peak is outside this range"

@@ -225,7 +225,9 @@ def _rescaled(curve: ErrorCurve, factor: float) -> Array:
 
 
 def _columns(readings: Array, each: Pass, low: float, high: float) -> Array:
-    """Columns of the fit: Chebyshev polynomials up to HIGHEST, delay, compliance of the clamps; (k, HIGHEST + 3)."""
+    """Columns of the fit, shape (k, HIGHEST + 3): Chebyshev polynomials up to order HIGHEST, delay, and compliance of
+    the clamps.
+    """
     place = (2.0 * readings - high - low) / (high - low)
     columns = (chebyshev.chebvander(place, HIGHEST), -each.speed, each.omega**2 * each.displacement)
     return np.column_stack(columns).astype(np.float64)

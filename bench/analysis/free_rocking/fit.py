@@ -69,7 +69,7 @@ class RockingFit:
 
     @property
     def residual(self) -> Array:
-        """Residual displacement [m], shape (n,)."""
+        """Residual of the fit, measured minus fitted displacement [m], shape (n,)."""
         return self.displacement - self.fitted
 
     @property

@@ -157,7 +157,7 @@ ON_BLOCK = {
     "storey 2, u2": "laser 2, block {height:.0f} mm above the table",
     "drift, u2 − u1": "laser 2 − laser 1, not the drift",
 }
-"""Labels of the traces that depend on laser 2, while laser 2 measures the block, by their usual labels."""
+"""Labels, by the usual label, of the traces that depend on laser 2, used while laser 2 measures the block."""
 FRAME_AND_BLOCK = "Frame: measured. Block: model, driven by the measured table motion"
 FACTOR = "magnification"
 FACTOR_TIP = "Magnification of the motion; also with the mouse wheel, or the keys + and −, on the picture."

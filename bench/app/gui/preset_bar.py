@@ -184,7 +184,7 @@ class PresetBar(QWidget):
         set_level(self.message, level)
 
     def _refresh(self) -> None:
-        """Enable the buttons; their tooltips give the reason where they are disabled."""
+        """Enable or disable the buttons; the tooltip of a disabled button gives the reason."""
         presets, protocol, form, name = self._presets, self._protocol, self._form, self.name.currentText().strip()
         invalid = texts.START_BAD if form is not None and form.refused else ""
         unnamed = "" if name else texts.PRESET_NO_NAME

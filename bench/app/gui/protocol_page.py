@@ -204,7 +204,7 @@ class ProtocolPage(QWidget):
             self.right.setCurrentWidget(self.help)
 
     def refresh(self) -> None:
-        """Enable the buttons; their tooltips give the reason where they are disabled."""
+        """Enable or disable the buttons; the tooltip of a disabled button gives the reason."""
         why, unplanned = self.why_not, self.why_not_planned
         self.start.setEnabled(not why)
         self.start.setToolTip(why or texts.START_TIP)

@@ -47,7 +47,7 @@ class QueuePage(QWidget):
     """List of tests; every action applies to the selected test and has a shortcut key."""
 
     edit_requested = Signal(object, int)
-    """Emits a `Queued` to be edited, which has not begun, and its number from 1."""
+    """Emits a `Queued` that has not begun and is to be edited, and its number, counted from 1."""
 
     def __init__(self, controller: Controller, runner: QueueRunner, entries: Sequence[Protocol[Any]]) -> None:
         super().__init__()

@@ -193,7 +193,7 @@ class ResultsPage(QWidget):
             self.show_file(path, place=Place.ASIDE, then=then)
 
     def _show_reading(self) -> None:
-        """Name the file that is being read."""
+        """Show the path of the file that is being read, if any."""
         path = self.opener.current
         text = "" if path is None else texts.OPENING.format(path=path)
         self.reading.setText(text)

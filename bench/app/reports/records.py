@@ -119,7 +119,7 @@ def drift_picture(specimen: Specimen, curves: Sequence[SeismicCurve], beta: floa
             drifts.append(drift)
         drawn.append(ModelDrift(curve.accelerogram.name, times, drifts[0], drifts[1]))
     band = curves[0].prepared.band
-    words = "unfiltered" if band is None else f"limited to {band[0]:g} to {band[1]:g} Hz"
+    words = "unfiltered" if band is None else f"limited to the band from {band[0]:g} to {band[1]:g} Hz"
     return Picture(
         model_drift_figure(drawn),
         f"Predicted drift of the bare and of the coupled frame (β = {beta:g}); records {words}.",
