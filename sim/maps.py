@@ -63,7 +63,7 @@ class BranchMap:
 
 @dataclass(frozen=True, eq=False)
 class GainMap:
-    """Both branches of steady motion over `betas`, shape (n,), and `omegas` [rad/s], shape (m,), under one amplitude
+    """Both branches of steady motion over `betas`, shape (n,), and `omegas` [rad/s], shape (m,), for one amplitude
     [m/s2].
 
     `sections`, shape (n, m, 6): a point of each rocking orbit, [phase, u1, u2, v1, v2, omega], right after the impact

@@ -196,8 +196,8 @@ def _stated(fit: _Fit, size: float) -> Multiplier:
 
 
 def _coloured(whitened: Array, angle: float) -> float:
-    """Power of a residual of unit variance, shape (n, m), near `angle` [rad] per cycle: the noise at other angles has
-    little effect on the pair.
+    """Power of the `whitened` residual, shape (n, m), near `angle` [rad] per cycle, relative to its mean over all
+    angles: noise at other angles has little effect on the fitted pair.
     """
     n = whitened.shape[0]
     away = np.arange(NEAR, FAR + 1, dtype=np.float64)

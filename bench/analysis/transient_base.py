@@ -161,8 +161,8 @@ def _levelled(values: Array, still: int) -> Array:
 
 
 def _closed(values: Array, still: int) -> Array:
-    """Values from which the final offset has been removed smoothly, because friction may stop the table at a different
-    position.
+    """Values relative to their initial mean, with the final offset removed smoothly, because friction may stop the
+    table at a different position.
     """
     begin, end = float(values[:still].mean()), float(values[-still:].mean())
     x = np.linspace(0.0, 1.0, values.size)

@@ -84,7 +84,7 @@ class ReadingProcess:
 
 
 def _started() -> subprocess.Popen[bytes]:
-    # unbuffered: at the end of Python, a buffer for which a thread still waits is a fatal error
+    # unbuffered: at exit, Python aborts if a thread still holds the lock of a buffer in which it waits
     return subprocess.Popen(
         [sys.executable, "-m", "bench.app.reading_process"],
         bufsize=0,

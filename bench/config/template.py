@@ -15,8 +15,8 @@ from sim.parameters import Parameters
 
 
 def as_toml(configuration: BenchConfiguration) -> str:
-    """All keys with a value, as TOML. The table `simulation` is omitted for the backend "hardware", and both tables of
-    the built-in backends for a backend of another package.
+    """All keys with a value, as TOML. For the backend "hardware", the table `simulation` is omitted; for a backend of
+    another package, `hardware` and `simulation` are.
     """
     unused = {"rig": {"hardware", "simulation"}, "hardware": {"simulation"}}.get(configuration.table, set[str]())
     plain: dict[str, Any] = configuration.model_dump(mode="json", exclude_none=True, exclude=unused)

@@ -128,7 +128,8 @@ def prepare(
     removed at each end; None keeps the whole record. `band` [Hz]: -6 dB points of zero-phase filters, with rest before
     and after; the table then ends at rest where it began. `peak` [m/s2]: of the trimmed and filtered record. `reach`:
     limits of the table's motion, to which the record is fitted by `method`, which changes the peak; `periods` [s] are
-    those at which the method least-change preserves the response spectrum. Raises InvalidInput for an impossible request.
+    those at which the method least-change preserves the response spectrum. Raises InvalidInput for an impossible
+    request.
     """
     peak_before = float(np.abs(record.acceleration).max())
     if not peak_before > 0.0:

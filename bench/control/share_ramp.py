@@ -20,7 +20,7 @@ class ShareRamp:
         self._played = 0
 
     def to(self, shares: tuple[complex, ...], samples: int, wait: int = 0) -> None:
-        """Change to `shares` within `samples` samples, beginning after `wait` samples; all other harmonics change to
+        """Change to `shares` over `samples` samples, beginning after `wait` samples; all other harmonics change to
         zero.
 
         Pending changes that are due at the same sample as this one or later are cancelled.

@@ -49,7 +49,7 @@ EASE = 6.0
 
 @dataclass(frozen=True)
 class Candidate:
-    """A candidate start-up: its sweeps end at the requested amplitude and frequency."""
+    """A candidate start-up: its last sweep ends at the requested amplitude and frequency."""
 
     name: str
     segments: tuple[Segment, ...]

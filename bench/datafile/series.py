@@ -89,7 +89,7 @@ class SampleReader:
         with reading(f"{self._instrument.name}/sample_rate"):
             rate = float(rate)
         if not LOWEST_RATE <= rate <= HIGHEST_RATE:
-            allowed = f"it must be from {LOWEST_RATE:g} to {HIGHEST_RATE:g} 1/s"
+            allowed = f"it must be between {LOWEST_RATE:g}/s and {HIGHEST_RATE:g}/s"
             raise DataFileError(f"{self._instrument.name}/sample_rate is {rate:g}, but {allowed}: the file is damaged")
         return rate
 

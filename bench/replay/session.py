@@ -21,7 +21,9 @@ from sim import waiting
 from sim.parameters import Parameters
 
 LONGEST_WAIT = 1.0
-"""Maximum pause in a replay in real time [s]; longer pauses, as for operator actions, are shortened to it."""
+"""Longest pause that a paced replay reproduces [s of bench time]; longer ones, as for operator actions, are shortened
+to it.
+"""
 
 
 class PacedClock:

@@ -200,7 +200,7 @@ class SerialLaser:
             self._stream.ask("OUTPUT RS422")
             if not self._stream.wait(_LOCK_TIME):
                 raise DeviceTimeout(
-                    f"{self._who} sends no consecutive measurements at {self._rate:g} 1/s; check the cable"
+                    f"{self._who} sends no consecutive measurements at {self._rate:g}/s; check the cable"
                     " and the trigger input, or lower the rate"
                 )
             if not self._is_rate_known:

@@ -69,7 +69,7 @@ _OWN_LATENCY = "the laser's internal latency is too long: raise its measuring ra
 
 _SKEW = (
     "the two sensors show the same motion at different times: connect both to inputs of one module, or "
-    "see the input delays in the bench description"
+    "check the input delays, which the report lists with the bench"
 )
 
 

@@ -58,8 +58,8 @@ def resting_lines(samples: RestSamples, parameters: CheckParameters, accuracy: S
 
 
 def safety_lines(configuration: BenchConfiguration) -> Iterator[CheckLine]:
-    """Lines for the safety inputs, and for the lack of both watchdog and heartbeat relay, after the acquisition at
-    rest; none for a simulated bench.
+    """Lines that follow the acquisition at rest: one for each safety input, and one if there is neither a watchdog nor
+    a heartbeat relay; none for a simulated bench.
 
     Inputs that are read have passed, since an open input would have prevented arming or ended the check; missing inputs
     are untested.
@@ -109,7 +109,7 @@ def drive_lines(sines: Sines, parameters: CheckParameters, configuration: BenchC
         (0.0, parameters.latency),
         "s",
         "inputs and output do not share clock and trigger, or the input delay is unknown: see hardware.daq "
-        "and the input delays in the bench description",
+        "and the input delays, which the report lists with the bench",
     )
     expected = expected_drive(sines.omega, configuration)
     for index, omega in enumerate(sines.omega):

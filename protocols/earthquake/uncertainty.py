@@ -6,8 +6,8 @@ distributed as the product of the drawn predicted gain and the drawn error of th
 expressed as a factor (GUM Supplement 1).
 
 A second set of draws, with an exactly known specimen, gives the uncertainty due to the bench alone. Contributions drawn
-one by one only show which one is the largest: where the response is chaotic, each one changes the gain as much as all
-together.
+one at a time indicate only which is the largest. They do not add up where the response is chaotic: each one alone then
+changes the gain as much as all of them together.
 """
 
 from collections.abc import Callable

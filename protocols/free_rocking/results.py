@@ -38,7 +38,7 @@ _COLUMNS = (
 )
 
 _FIT = "impacts of "
-"""Prefix of the name of a fit that contains the single impacts of a tilt."""
+"""Prefix of the name of a fit that contains the individual impacts after a tilt."""
 
 _MOTION = (("r_motion", "r_exp"), ("r_motion_uncertainty", "r_exp_uncertainty"))
 """Fields of the restitution from the fit of the motion, each with the field that contains it in older files."""

@@ -1,4 +1,6 @@
-"""Live view of the laser calibration: error of each laser over its range, and its change without each pass."""
+"""Live view of the laser calibration: error of each laser over its range, and its change if any one pass is
+omitted.
+"""
 
 import numpy as np
 

@@ -39,7 +39,9 @@ def _fit(
     plot: Annotated[
         Path | None,
         Parameter(
-            name="--plot", metavar="FILE", help="Draw histories and spectra, before and after: .png, .pdf or .svg."
+            name="--plot",
+            metavar="FILE",
+            help="Plot histories and spectra before and after the fit to FILE (.png, .pdf or .svg).",
         ),
     ] = None,
     as_json: Json = False,

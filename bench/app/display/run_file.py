@@ -75,5 +75,5 @@ def _labels(protocol: str) -> Mapping[str, str]:
 
 
 def read_path(path: Path) -> RunFile | Path:
-    """The file at a path, or the path itself if it is a folder. Raises like `read_file`."""
+    """The file at a path, or the path itself if it is a folder. Raises the errors of `read_file`."""
     return path if path.is_dir() else read_file(path)

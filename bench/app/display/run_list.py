@@ -52,7 +52,7 @@ class Found:
 
 @dataclass(frozen=True)
 class Listing:
-    """The data files of a folder; `real` is its path without links."""
+    """The data files of a folder; `real` is its path with symbolic links resolved."""
 
     real: Path
     found: tuple[Found, ...]

@@ -100,7 +100,7 @@ def read_values(tracks: Sequence[Track], times: Sequence[float]) -> list[list[fl
 
 
 def probe(tracks: Sequence[Track], times: tuple[float, float]) -> Probe:
-    """The samples of the tracks at two cursors. Raises like `read_values`."""
+    """The samples of the tracks at two cursors. Raises the errors of `read_values`."""
     return Probe(tracks, times, read_values(tracks, times))
 
 

@@ -218,7 +218,7 @@ def opengl(cards: Path = Path("/dev/dri")) -> Finding:
     """Check whether the window is installed and, on Linux, whether a graphics card is present."""
     if importlib.util.find_spec("PySide6") is None:
         return Finding(
-            "OpenGL", Health.NOTICE, "the window is not installed", "to use the window, install the extra gui"
+            "OpenGL", Health.NOTICE, "the window is not installed", "to use the window, install rocking-bench[gui]"
         )
     if sys.platform == "linux" and not cards.is_dir():
         return Finding(

@@ -7,7 +7,7 @@ from sim.kernel.compiled import compiled, generic
 from sim.kernel.lanes import fma, get, put
 
 CHAINS = 12
-"""Number of independent recurrences, more than the multiply-adds that a usual core has in progress at once."""
+"""Number of independent recurrences, more than the multiply-adds that a typical core executes at once."""
 
 
 @generic

@@ -290,7 +290,7 @@ def _changed(path: Path, dataset: str, row: int, value: object) -> None:
         ("points/good", 0, 0, POINTS, "row 1 of points: good was False"),
         ("points/doubt", 0, 0.1, POINTS, "row 1 of points: doubt was 0.1 and is None"),
         ("estimates/predicted", 0, 1.1, "estimates", "row 1 of estimates: predicted was 1.1"),
-        ("instrument/drive/voltage", 1204, 3.0, DRIVE, "sample 1204 of run 1 onward: recorded 3 V"),
+        ("instrument/drive/voltage", 1204, 3.0, DRIVE, "the drive first differs at sample 1204 of run 1: recorded 3 V"),
         ("events/text", 3, "nobody knows", JOURNAL, "journal entry 4 was"),
         ("summary", (), "all was well", "ending", "all was well"),
     ],

@@ -205,7 +205,7 @@ def test_the_pulse_keeps_its_distance_from_every_limit(tmp_path: Path) -> None:
     [
         (FreeVibrationParameters(drift=0.002), "drift", "0.003 m"),
         (FreeVibrationParameters(pulse=0.005), "pulse", "at least 0.01 s"),
-        (FreeVibrationParameters(excitation="hand", pull=0.1), "pull", "lasers' ranges"),
+        (FreeVibrationParameters(excitation="hand", pull=0.1), "pull", "measuring ranges"),
         (CouplingStiffnessParameters(reference=False), "reference", "not identified"),
     ],
 )
