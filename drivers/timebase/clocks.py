@@ -22,8 +22,8 @@ class SampleClock:
 
     Each reading bounds the clock on both sides: by the last sample taken and by the next one. The estimate is midway
     between the tightest bounds, and NaN before the first sample. With packet transfer, as over USB, the count lags
-    behind the samples taken, and the bounds may contradict each other. The bound from the next sample is then ignored for
-    the rest of the run; the estimate is late by the shortest transfer time, a constant that is part of the delay
+    behind the samples taken, and the bounds may contradict each other. The bound from the next sample is then ignored
+    for the rest of the run; the estimate is late by the shortest transfer time, a constant that is part of the delay
     measured by the loop check.
     """
 
