@@ -162,7 +162,7 @@ def test_there_is_no_run_after_the_last() -> None:
     rig = ReplayRig(Made([MadeRun([(0, 50)])]))
     rig.arm()
     rig.stop()
-    with pytest.raises(RigError, match="all 1 recorded runs"):
+    with pytest.raises(RigError, match="no recorded run remains"):
         rig.arm()
     with pytest.raises(RigError, match="not armed"):
         rig.read(1)

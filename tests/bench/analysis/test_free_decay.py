@@ -232,5 +232,5 @@ def test_what_tells_nothing_is_refused() -> None:
     kept = pulsed_decay(lost, setting(), QUIET, BEGIN)
     assert kept.quantities[K1] == pytest.approx(FRAME.k1, rel=2e-5)
     still = np.random.default_rng(2).normal(0.0, 1e-5, signals.shape)
-    with pytest.raises(Unusable, match="was not released"):
+    with pytest.raises(Unusable, match="no release was found"):
         released_decay(still, setting())
