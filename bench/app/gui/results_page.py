@@ -95,6 +95,8 @@ class ResultsPage(QWidget):
         self.parts = QTabWidget()
         self._arrange()
         self.setAcceptDrops(True)
+        # ready when the file of the run is to be shown
+        controller.began.connect(lambda _: start_reading())
         controller.ended.connect(self.show_end)
         controller.changed.connect(self._refresh)
         self._refresh()
