@@ -1,7 +1,10 @@
-"""Texts of the window that are clipped on a screen: `python -m tests.bench.app.gui.pixels WIDTH HEIGHT [THEME]`.
+"""Texts of the window that are clipped, or covered by another one, on a screen.
 
-The screen has this size in physical pixels; `QT_SCALE_FACTOR` scales the window. With the argument `grid` alone, every
-size, scale and theme of `SCREENS`, `SCALES` and `THEMES` is shown, in one process each.
+    python -m tests.bench.app.gui.pixels WIDTH HEIGHT [THEME [FILES]]
+
+The screen has this size in physical pixels; `QT_SCALE_FACTOR` scales the window. Pictures of the pages are saved under
+names that begin with FILES. With the argument `grid` alone, every size, scale and theme of `SCREENS`, `SCALES` and
+`THEMES` is shown, in one process each.
 """
 
 import os
@@ -49,6 +52,28 @@ def clipped(window: Window) -> list[str]:
     return found
 
 
+def overlapping(window: QWidget) -> list[str]:
+    """Pairs of visible texts, labels or buttons, that share pixels."""
+    found = [each for each in window.findChildren(QWidget) if isinstance(each, QLabel | QAbstractButton)]
+    shown = [(each, _seen(each, window)) for each in found if each.isVisible() and each.text()]
+    return [
+        f"{one.text()!r} and {other.text()!r} overlap"
+        for number, (one, place) in enumerate(shown)
+        for other, there in shown[:number]
+        if min(place.intersected(there).width(), place.intersected(there).height()) > 1
+        and not (one.isAncestorOf(other) or other.isAncestorOf(one))
+    ]
+
+
+def _seen(part: QWidget, window: QWidget) -> QRect:
+    """The part of a widget that its parents do not cut off."""
+    seen, parent = _place(part, window), part.parentWidget()
+    while parent is not None and parent is not window:
+        seen = seen.intersected(_place(parent, window))
+        parent = parent.parentWidget()
+    return seen
+
+
 def _place(part: QWidget, window: QWidget) -> QRect:
     return QRect(part.mapTo(window, QPoint(0, 0)), part.size())
 
@@ -66,7 +91,7 @@ def _scrolls(part: QWidget) -> bool:
 
 
 def main(width: int, height: int, theme: str) -> int:
-    """Show every page on a screen of this size [px]; prints and counts what is clipped."""
+    """Show every page on a screen of this size [px]; prints and counts what is clipped or covered."""
     os.environ["ROCKBENCH_SESSIONS"] = "off"
     application = QApplication([])
     controller = Controller()
@@ -83,7 +108,7 @@ def main(width: int, height: int, theme: str) -> int:
         window.pages.setCurrentIndex(number)
         for _ in range(3):
             application.processEvents()
-        wrong += [f"{window.pages.tabText(number)}: {each}" for each in clipped(window)]
+        wrong += [f"{window.pages.tabText(number)}: {each}" for each in (*clipped(window), *overlapping(window))]
         if len(sys.argv) > 4:
             window.grab().save(f"{sys.argv[4]}-{width}-{scale:g}-{theme}-{number}.png")
     window.results.show_run()
@@ -91,7 +116,7 @@ def main(width: int, height: int, theme: str) -> int:
         window.results.parts.setCurrentIndex(part)
         for _ in range(3):
             application.processEvents()
-        wrong += [f"{window.results.parts.tabText(part)}: {each}" for each in clipped(window)]
+        wrong += [f"{window.results.parts.tabText(part)}: {each}" for each in (*clipped(window), *overlapping(window))]
     print("\n".join(wrong))
     window.leave()
     return len(wrong)
