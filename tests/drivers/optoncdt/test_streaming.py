@@ -93,7 +93,7 @@ def test_a_stream_that_is_not_as_said_is_refused(answer: bytes, monkeypatch: pyt
     monkeypatch.setattr("drivers.optoncdt.sensor._LOCK_TIME", 0.2)
     with no_thread_left(), Peer([*OPENED, STARTED[0], (b"OUTPUT RS422", answer), *STOPPED]) as peer:
         laser = opened(peer)
-        with pytest.raises(DeviceTimeout, match="sends no consecutive measurements at 4000 1/s"):
+        with pytest.raises(DeviceTimeout, match="sends no consecutive measurements at 4000/s"):
             laser.start()
         laser.close()
 
