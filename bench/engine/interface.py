@@ -4,9 +4,11 @@ from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from math import isnan
+from types import FrameType
 from typing import Protocol
 
 from bench.events import Event, PointFinished, Subscriber, Warned
+from bench.unfinished import keep_broken_off
 from drivers.clock import Clock
 from drivers.errors import RigError
 from sim.errors import UNKNOWN, Cause, CauseCode, Interruption, RockbenchError
@@ -110,6 +112,14 @@ class Requests:
             yield
         finally:
             self.breaking = before
+
+    def break_off(self, frame: FrameType | None) -> None:
+        """For a signal handler called in `frame`: raise the exception of `breakable`, and keep the objects of the
+        computation; outside `breakable`, return.
+        """
+        if self.breaking is not None:
+            keep_broken_off(frame)
+            raise self.breaking()
 
     @contextmanager
     def without_rig(self) -> Generator[None]:

@@ -88,9 +88,8 @@ class RunInterrupts(Interrupts):
             requests.halt()
         if self._asking():
             raise KeyboardInterrupt
-        if first and requests.breaking is not None:
-            keep_broken_off(frame)
-            raise requests.breaking()
+        if first:
+            requests.break_off(frame)
 
 
 @contextmanager

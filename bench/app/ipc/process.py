@@ -19,7 +19,6 @@ from bench.app.preflight import compile_run, prepare
 from bench.app.session import run_session
 from bench.config.model import BenchConfiguration
 from bench.engine.interface import Requests, Unattended
-from bench.unfinished import keep_broken_off
 from sim.errors import CauseCode, InvalidInput, RockbenchError, cause_of
 from sim.waiting import STEP
 
@@ -124,9 +123,7 @@ def _abort_on_terminate(requests: Requests) -> None:
         # the receiving thread also raises this signal, at a client's request
         if requests.strongest is None:
             requests.abort("the session process received a request to terminate")
-        if requests.breaking is not None:
-            keep_broken_off(frame)
-            raise requests.breaking()
+        requests.break_off(frame)
 
     signal.signal(signal.SIGTERM, handle)
 
