@@ -2,8 +2,9 @@
 a few buttons, so a window is used again if, put back, it is to the last text and switch as it was at first.
 """
 
-from collections.abc import Generator, Iterator
+from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
+from typing import TypeVar
 
 from PySide6.QtCore import QCoreApplication, QEvent
 from PySide6.QtWidgets import (
@@ -23,7 +24,7 @@ from PySide6.QtWidgets import (
 from bench.app.catalogue import all_protocols
 from bench.app.display import texts
 from bench.app.display.session_state import SessionState
-from bench.app.display.theme import LIGHT
+from bench.app.display.theme import LIGHT, Theme
 from bench.app.gui import window as parts
 from bench.app.gui.controller import Controller
 from bench.app.gui.header import application
@@ -37,8 +38,21 @@ from tests.bench.app.ipc.experiment import SHAKING, bench
 PROTOCOLS = tuple(each for each in all_protocols()[0] if each.name != SHAKING.name)
 """Those of the project."""
 
+Page = TypeVar("Page", bound=QWidget)
 Kind = tuple[object, ...]
 Looks = list[tuple[object, ...]]
+
+
+@contextmanager
+def page_alone(kind: Callable[[Controller, Theme], Page], height: int) -> Generator[Page]:
+    """A page without its window, with a controller of its own; not shown yet."""
+    controller = Controller()
+    page = kind(controller, LIGHT)
+    page.resize(1200, height)
+    yield page
+    controller.close()
+    page.close()
+    page.deleteLater()
 
 
 class NoPlots(QWidget):

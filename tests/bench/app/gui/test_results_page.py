@@ -16,13 +16,12 @@ from scipy.io import loadmat
 
 from bench.app.display import texts
 from bench.app.display.gains import compare
-from bench.app.display.theme import LIGHT
-from bench.app.gui.controller import Controller
 from bench.app.gui.outputs import free
 from bench.app.gui.results_page import ResultsPage
 from bench.app.ipc.messages import Ended
 from protocols.harmonic.protocol import PointStatus
 from tests.bench.app.gui.run_files import close_files, counts, made, point, settle, show
+from tests.bench.app.gui.shared_window import page_alone
 from tests.patience import LONG_MS
 
 
@@ -47,14 +46,9 @@ def verdicts(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def one_page(qapp: QApplication) -> Generator[ResultsPage]:  # noqa: ARG001 - Qt needs its application
-    controller = Controller()
-    shown = ResultsPage(controller, LIGHT)
-    shown.resize(1200, 700)
-    shown.show()
-    yield shown
-    controller.close()
-    shown.close()
-    shown.deleteLater()
+    with page_alone(ResultsPage, 700) as shown:
+        shown.show()
+        yield shown
 
 
 @pytest.fixture

@@ -25,6 +25,7 @@ from bench.datafile.reader import open_datafile
 from bench.events import PointFinished
 from sim.specimen import Specimen
 from tests.bench.app.gui.run_files import begun, close_files, made, point, settle
+from tests.bench.app.gui.shared_window import page_alone
 from tests.patience import LONG_MS
 
 AGREES = {"alpha_2_predicted": 0.199, "alpha_2_predicted_uncertainty": 0.002, "agrees": True}
@@ -61,15 +62,10 @@ def one(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def one_page(qapp: QApplication, folder: Path) -> Generator[ResultsPage]:  # noqa: ARG001 - Qt needs its application
-    controller = Controller()
-    shown = ResultsPage(controller, LIGHT)
-    shown.browser.folder = folder
-    shown.resize(1200, 700)
-    shown.show()
-    yield shown
-    controller.close()
-    shown.close()
-    shown.deleteLater()
+    with page_alone(ResultsPage, 700) as shown:
+        shown.browser.folder = folder
+        shown.show()
+        yield shown
 
 
 @pytest.fixture

@@ -16,7 +16,6 @@ from pytestqt.qtbot import QtBot
 from bench.app.display import texts
 from bench.app.display.buffers import Ring
 from bench.app.display.theme import LIGHT
-from bench.app.gui.controller import Controller
 from bench.app.gui.run_page import GAINS_HEIGHT, RunPage
 from bench.app.gui.traces import AHEAD, LEAST
 from bench.app.gui.window import SMALLEST, Window
@@ -32,6 +31,7 @@ from protocols.earthquake.protocol import PointStatus as PointOutcome
 from protocols.harmonic.protocol import HarmonicParameters, HarmonicPoint, PointStatus
 from sim.specimen import Specimen
 from tests.bench.app.gui.conftest import ScriptedClient
+from tests.bench.app.gui.shared_window import page_alone
 from tests.bench.app.ipc.experiment import order
 from tests.bench.twin.twin_bench import estimate
 from tests.patience import LONG, LONG_MS
@@ -113,14 +113,9 @@ def test_a_gap_breaks_the_line() -> None:
 @pytest.fixture(scope="module")
 def page(qapp: QApplication) -> Generator[RunPage]:  # noqa: ARG001 - Qt needs its application
     """One page for all runs: nothing of a run may remain in the next one."""
-    controller = Controller()
-    shown = RunPage(controller, LIGHT)
-    shown.resize(1200, 600)
-    shown.show()
-    yield shown
-    controller.close()
-    shown.close()
-    shown.deleteLater()
+    with page_alone(RunPage, 600) as shown:
+        shown.show()
+        yield shown
 
 
 PREDICTION = {
