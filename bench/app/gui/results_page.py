@@ -96,7 +96,7 @@ class ResultsPage(QWidget):
         self._arrange()
         self.setAcceptDrops(True)
         # ready when the file of the run is to be shown
-        controller.began.connect(lambda _: start_reading())
+        controller.began.connect(start_reading)
         controller.ended.connect(self.show_end)
         controller.changed.connect(self._refresh)
         self._refresh()
