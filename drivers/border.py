@@ -267,7 +267,8 @@ _NONE: tuple[()] = ()
 class _Calls:
     """Context manager that converts exceptions that a rig must not raise into BackendFault.
 
-    Implemented as a class, because every block enters six of these and a generator would take several times as long.
+    Implemented as a class, because every block enters several of these, and a generator would take several times as
+    long.
     """
 
     __slots__ = ("_backend", "_call")

@@ -89,7 +89,9 @@ class Alignment:
             if number
         )
         given = ", ".join((f"{self.values} values, {self.lost} lost", *counted))
-        marked = "" if isinf(self.mark_uncertainty) else f", pulses +-{1e6 * self.mark_uncertainty:.0f} us"
+        marked = (
+            "" if isinf(self.mark_uncertainty) else f", aligned by pulses to +-{1e6 * self.mark_uncertainty:.0f} us"
+        )
         return f"{self.sensor}: clock {rate:+.1f} ppm, rms residual {residual:.0f} us{marked}, {given}"
 
 

@@ -66,7 +66,7 @@ class SeismicGain:
     """Gain coefficients of the spring labelled `beta` under a record; both None unless the run was completed.
 
     `motion` contains the peaks and the overturning, if any (`motion.overturned`, `motion.end_time`); `bare` contains
-    the peaks of the frame without block.
+    the peaks of the frame without the block.
     """
 
     beta: float
@@ -81,7 +81,7 @@ def predict_gain(
 ) -> GainPrediction:
     """Gain coefficients under `amplitude` [m/s2] sin(`omega` [rad/s] t).
 
-    `bare_amplitude` [m/s2] is the amplitude of the test without block, if different.
+    `bare_amplitude` [m/s2] is the amplitude of the test without the block, if different.
     Raises InvalidInput for a bare specimen or values outside their ranges. Source: Eq. (10).
     """
     resting = resting_state(specimen, omega, amplitude)

@@ -46,7 +46,7 @@ def frame_matrices(frame: Frame) -> tuple[NDArray[np.float64], NDArray[np.float6
 
 
 def bare_modes(frame: Frame) -> Modes:
-    """Both modes of the frame without block, with shapes in (u1, u2)."""
+    """Both modes of the frame without the block, with shapes in (u1, u2)."""
     mass, _, stiffness = frame_matrices(frame)
     return _modes(mass, stiffness)
 

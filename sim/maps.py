@@ -26,7 +26,7 @@ Floats = NDArray[np.float64]
 class BranchMap:
     """Branch of steady motion over the grid of n stiffnesses by m frequencies; NaN where it does not exist.
 
-    `peaks`, shape (n, m, 3): |u1|, |u2 - u1| [m], |theta| [rad]. `bare`, shape (m, 3): the same without block.
+    `peaks`, shape (n, m, 3): |u1|, |u2 - u1| [m], |theta| [rad]. `bare`, shape (m, 3): the same without the block.
     `multipliers`: Floquet multipliers per period of the drive, shape (n, m, 6) of the rocking branch, (n, m, 4) of the
     resting one.
     """
@@ -90,7 +90,7 @@ def gain_map(
 ) -> GainMap:
     """Gain coefficients of both branches at every stiffness ratio of `betas` and frequency of `omegas` [rad/s].
 
-    The base acceleration is `amplitude` [m/s2] sin(omega t); in the test without block, its amplitude is
+    The base acceleration is `amplitude` [m/s2] sin(omega t); in the test without the block, its amplitude is
     `bare_amplitude`, if different. `scheduler` and `done` are those of `sim.sweep.sweep`. Raises InvalidInput for an
     empty axis or a frequency or amplitude outside its range, and pydantic's ValidationError for a negative stiffness.
     """

@@ -13,7 +13,8 @@ from pydantic import BaseModel, ConfigDict, Field
 from pydantic.fields import FieldInfo
 
 NEAR, NEAR_ANGULAR = 20.0, 3.0
-"""Factors from a default up to which a value causes no notice: for most units, and for those in `_ANGULAR`.
+"""Largest factors by which a value may differ from its default without a notice: for most units, and for those in
+`_ANGULAR`.
 
 A wrong prefix changes a value by a factor of 1000, and a wrong angular unit by 2 pi. The mistake is noticed if the
 intended value is within a factor of 50 or 2, respectively, of the default.

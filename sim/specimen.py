@@ -217,7 +217,7 @@ class Specimen(Parameters):
         return self._mounted(k_c / self.frame.k1, nominal if label is None else label)
 
     def bare(self) -> "Specimen":
-        """Return the frame without block and spring."""
+        """Return the frame without the block and the spring."""
         return self._mounted(None)
 
     def _mounted(self, beta: float | None, label: float | None = None) -> "Specimen":

@@ -27,9 +27,8 @@ from bench.app.catalogue import all_protocols
 from bench.app.cli.emulate import _at_rate, _ratios
 from bench.app.cli.inputs import configuration_from, parameters_from, request_from, specimen_from
 from bench.app.cli.main import main as command_line
-from bench.app.cli.options import flag
 from bench.app.cli.replay import _clock
-from bench.config.declared import Declared, at, declared
+from bench.config.declared import Declared, at, declared, flag
 from bench.config.model import BenchConfiguration
 from bench.config.review import review
 from bench.config.toml import problems_of, read_configuration

@@ -10,9 +10,6 @@ from bench.document.document import Document, Listing, Notice, Part, Picture, Ta
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-NAMES = "name"
-"""Title of the columns of a report with names of parameters, which are beside their descriptions."""
-
 _TYPED = re.compile(
     r"`[^`]*`"  # commands and keys that are quoted as such
     r'|(?<!\{)"[\w.]+"'  # words that a key or an option takes
@@ -85,9 +82,7 @@ def _part_texts(part: Part) -> Iterator[str]:
         case Table():
             yield part.caption
             yield from (column.heading for column in part.columns)
-            # the name of a parameter is beside its description: it is what was typed
-            shown = [place for place, column in enumerate(part.columns) if column.title != NAMES]
-            yield from (row[place] for row in part.rows for place in shown)
+            yield from (cell for row in part.rows for cell in row)
         case Picture():
             yield part.caption
             yield part.description

@@ -96,7 +96,7 @@ Checks = tuple[Harmonics, Harmonics]
 
 @dataclass(frozen=True)
 class LinearFrame:
-    """The frame without block, measured by lasers on the ground or (`grounded` False) on the table."""
+    """The frame without the block, measured by lasers on the ground or (`grounded` False) on the table."""
 
     specimen: Specimen
     grounded: bool
@@ -207,9 +207,9 @@ def _posterior(checks: tuple[Harmonics, ...], limit: float, whole: float) -> _Po
 
 
 def _covariances(one: Array, left: Array, other: Array, right: Array, whole: float) -> Array:
-    """Covariances of linear functions of the curve, relative to the variance, shape (2 NUMBERS, l, r), irregular curves
-    before sines. `left`, shape (l, n), applies to the values at the places `one`, shape (n,), and `right`, shape (r,
-    m), to those at `other`, shape (m,).
+    """Covariances of linear functions of the error curve, relative to its variance, shape (2 NUMBERS, l, r): the first
+    NUMBERS entries are for irregular curves, the others for sines. `left`, shape (l, n), applies to the values at the
+    places `one`, shape (n,), and `right`, shape (r, m), to those at `other`, shape (m,).
     """
     first = 2.0 * pi * FEWEST / whole
     distances: Array = one[:, None] - other[None, :]

@@ -70,7 +70,7 @@ class SteadyDetector:
         self._cycles: deque[Cycle] = deque(maxlen=2 * WINDOW)
 
     def push(self, cycle: Cycle) -> None:
-        """Process the next cycle."""
+        """Add the next cycle."""
         self._cycles.append(cycle)
 
     def restart(self) -> None:

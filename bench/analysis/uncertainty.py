@@ -95,7 +95,7 @@ COVERAGE = 2.0
 """Coverage factor k of every expanded uncertainty."""
 
 NORMAL = 1000.0
-"""Effective degrees of freedom from which they are not stated: Student's t distribution is practically normal."""
+"""Effective degrees of freedom at and above which they are not stated: Student's t is then practically normal."""
 
 
 @dataclass(frozen=True)

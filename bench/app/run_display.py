@@ -131,7 +131,7 @@ def notice_of(event: Event) -> Notice | None:
 def twin_line(event: TwinEstimate) -> str:
     """Peak drifts, residual, gains with the model's band if known, and fraction of standing blocks if below 1."""
     words = [f"drift peak {_millimetres(event.drift_peak_measured)}, model {_millimetres(event.drift_peak)}"]
-    words.append(f"residual {_share(event.residual)}, outside the band {_share(event.excess)}")
+    words.append(f"residual {_share(event.residual)}, excess over the band {_share(event.excess)}")
     if isfinite(event.alpha_2):
         band = f"{number(event.alpha_2_low)} to {number(event.alpha_2_high)}"
         words.append(f"alpha_2 {number(event.alpha_2_measured)}, model {number(event.alpha_2)} ({band})")

@@ -131,6 +131,11 @@ def keys(model: type[Parameters], prefix: str = "") -> Iterator[str]:
             yield prefix + entry.name
 
 
+def flag(name: str) -> str:
+    """The flag of a parameter on the command line, such as `--amplitude-factor` for `amplitude_factor`."""
+    return "--" + name.replace("_", "-")
+
+
 def summary(model: type[Parameters]) -> str:
     """The first line of a group's docstring."""
     return (getdoc(model) or "").split("\n", 1)[0]

@@ -295,8 +295,8 @@ class BenchConfiguration(Parameters):
         heartbeat = self.hardware.daq.heartbeat
         if heartbeat is not None and heartbeat.timeout < _BLOCKS_OF_HEARTBEAT * block:
             allowed = (
-                f"the heartbeat rises every second block of {block:g} s: set a time-out of {_BLOCKS_OF_HEARTBEAT} "
-                "blocks or more"
+                f"the heartbeat has one rising edge in two blocks, and a block lasts {block:g} s: set a time-out of "
+                f"{_BLOCKS_OF_HEARTBEAT} blocks or more"
             )
             raise InvalidInput("hardware.daq.heartbeat.timeout", heartbeat.timeout, allowed)
         if self.hardware.lasers.connection == "serial" and block < _SHORTEST_WITH_SERIAL_LASERS:

@@ -27,7 +27,7 @@ class Members:
     scales: Array
 
     def bare(self) -> "Members":
-        """Return the members without block and spring."""
+        """Return the members without the block and the spring."""
         return Members([specimen.bare() for specimen in self.specimens], self.scales)
 
     def first(self, n: int) -> "Members":
@@ -93,7 +93,7 @@ class Measured:
 
 
 class Gains:
-    """Gain alpha_2 of every member during one run: ratio of its peak drifts with and without block."""
+    """Gain alpha_2 of every member during one run: ratio of its peak drifts with and without the block."""
 
     def __init__(self, those: Members, dt: float) -> None:
         self._those, self._dt = those, dt

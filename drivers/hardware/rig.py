@@ -237,7 +237,9 @@ class HardwareRig(RigBase):
 
     @contextmanager
     def _raised_once(self) -> Generator[None]:
-        """Context manager that suppresses a RigError from stopping the devices if an earlier failure was raised."""
+        """Context manager that suppresses a RigError raised while the devices are stopped, if an earlier failure was
+        raised.
+        """
         try:
             yield
         except RigError:

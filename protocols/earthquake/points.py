@@ -110,7 +110,7 @@ def overturned_point(
     draws: int,
     seed: int,
 ) -> EarthquakePoint:
-    """Point of a record that toppled the block; the prediction is for the table motion of the test without block."""
+    """Point of a record that toppled the block; the prediction is for the table motion of the bare test."""
     time = overturning_time(signals, shaking.target.sample_rate, specimen)
     base = bare.observed.base
     scale = configuration.sensors.table_scale

@@ -127,17 +127,17 @@ def fit_events(tilt: Tilt, alone: Findings, uncertain: Array, number: int) -> It
 def identified_specimen(found: Findings, tilts: int, block: Block, known: Identified | None) -> Identified:
     """Identified specimen with the restitution factor of `block`, the ratio of measured to theoretical restitution.
 
-    The theoretical value depends on the block's width 2b and height 2h_b, so the source of the finding states both and
-    the measured restitution.
+    The theoretical value depends on the block's width and height, so the source of the finding states both and the
+    measured restitution.
     """
     theory, r = theoretical_restitution(block), found.restitution
     by = "amplitudes of the swings" if found.by_amplitudes else "exact motion"
-    sides = f"2b = {2.0 * block.b:.6g} m, 2h_b = {2.0 * block.h_b:.6g} m"
+    size = f"{2.0 * block.b:.6g} m wide and {2.0 * block.h_b:.6g} m high"
     finding = Finding(
         name="restitution_factor",
         value=r.value / theory,
         standard_uncertainty=r.uncertainty / theory,
-        source=f"free rocking (tilts: {tilts}), from the {by}: r_exp = {r.value:.6f} of a block of {sides}",
+        source=f"free rocking (tilts: {tilts}), from the {by}: r_exp = {r.value:.6f} of a block {size}",
         date=datetime.now(UTC).replace(microsecond=0),
     )
     return (known or Identified()).extended([finding])

@@ -104,7 +104,10 @@ def _is_within(made: Callable[..., Any], folder: Path) -> bool:
 
 
 def _cache_of(function: Callable[..., Any]) -> KernelCache:
-    """Cache for the folder of a function. Outside the kernel, the hash of the folder includes that of the kernel."""
+    """Cache of the compiled functions of the source folder that contains `function`.
+
+    For sources outside the kernel, the hash in the name of the cache folder also covers the kernel's.
+    """
     folder = Path(function.__code__.co_filename).parent
     if folder not in _caches:
         _caches[folder] = KernelCache(_GIVEN, [*_VERSIONS, _cache.name], folder)

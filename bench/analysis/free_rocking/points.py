@@ -1,16 +1,17 @@
 """Single points of the motion, each determined from the samples around it: impact times and turning points, and the
-restitution that follows from them. They assume only a smooth motion between impacts, and are therefore a check of a
+restitution that follows from them. They assume only a smooth motion between impacts, and are therefore a check on a
 model fitted to the entire motion. A Butterworth low-pass delays a smooth motion without distortion: its gain has no
 term in omega^2, so its impulse response has no second cumulant, and a parabola is only delayed. Its response to the
 kink at an impact has decayed after `AFTER`, and those samples are excluded.
 
 Between impacts the energy is constant, so the largest angles before and after an impact give the restitution of the
-angular velocity, exactly and independent of time:
+angular velocity, exactly and independently of time:
 
     r_n^2 = (cos(alpha - |theta_n+1|) - cos(alpha)) / (cos(alpha - |theta_n|) - cos(alpha)).
 
-For a constant r the logarithm of that energy falls linearly, by 2 ln(r) per impact; the line through all points gives
-the mean r. alpha and the laser's scale have little influence: numerator and denominator contain them.
+For a constant r the logarithm of that energy changes linearly, by 2 ln(r) per impact; the line through all points gives
+the mean r. alpha and the laser's scale have little influence, because they enter both the numerator and
+the denominator.
 """
 
 from dataclasses import dataclass

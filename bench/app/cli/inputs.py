@@ -6,8 +6,8 @@ from math import prod
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from bench.app.cli.options import flag
 from bench.app.cli.output import print_warning
+from bench.config.declared import flag
 from bench.config.validation import dotted, read_fields, validated
 from sim.errors import InvalidInput
 from sim.parameters import Parameters

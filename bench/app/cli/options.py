@@ -14,7 +14,7 @@ from typing import Annotated, Any, Literal
 from cyclopts import Group, Parameter
 
 from bench.app.formatting import as_typed
-from bench.config.declared import Declared, declared
+from bench.config.declared import Declared, declared, flag
 from bench.progress import Progress
 from sim.parameters import Parameters
 
@@ -70,11 +70,6 @@ RecordText = Annotated[
         "synthetic:NAME[:SEED].",
     ),
 ]
-
-
-def flag(name: str) -> str:
-    """The flag of a parameter, such as `--amplitude-factor` for `amplitude_factor`."""
-    return "--" + name.replace("_", "-")
 
 
 def with_flags(

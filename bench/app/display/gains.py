@@ -109,7 +109,7 @@ def lines_of(prediction: Table) -> list[Line]:
 
 
 def mark_of(point: Mapping[str, Any]) -> Mark | None:
-    """The mark for a recorded point; None if the point has no fields of a gain, or if its motion was not played."""
+    """The mark for a recorded point; None if the point has no gain fields, or if its motion was not played."""
     beta = point.get("beta")
     if beta is None or "alpha_2" not in point:
         return None

@@ -5,7 +5,7 @@ from datetime import UTC, datetime
 from hashlib import file_digest
 from typing import Any, cast
 
-from bench.config.declared import declared
+from bench.config.declared import declared, flag
 from bench.document.campaign import Campaign
 from bench.document.document import Column, Part, Section, Table
 from bench.document.typography import ABSENT, first_words, moment, plain, typeset, unit_text
@@ -26,11 +26,14 @@ _DEVICES = {"backend": "kind of bench"}
 """Labels of those entries of a bench description that are not devices."""
 
 
-def provenance_section(campaign: Campaign) -> Section:
-    """Report section on the data file, its hash, operator, software versions, parameters, bench and sensor clocks."""
+def provenance_section(campaign: Campaign, positional: str | None = None) -> Section:
+    """Report section on the data file, its hash, operator, software versions, parameters, bench and sensor clocks.
+
+    `positional` is the parameter that the command line accepts as arguments without a flag.
+    """
     parts: list[Part] = [
         facts_table("Provenance of the numbers in this report", {**_file(campaign), **_made_with(campaign)}),
-        parameters_table("Parameters of the protocol", campaign.parameters_type, campaign.parameters),
+        parameters_table("Parameters of the protocol", campaign.parameters_type, campaign.parameters, positional),
     ]
     if campaign.devices:
         devices = {_DEVICES.get(name, name.replace("_", " ")): typeset(text) for name, text in _bench(campaign).items()}
@@ -132,16 +135,20 @@ def facts_table(caption: str, facts: Mapping[str, str]) -> Table:
     return Table(caption, [Column("item", words=True), Column("value", words=True)], rows)
 
 
-def parameters_table(caption: str, kind: type[Parameters] | None, values: Mapping[str, Any]) -> Table:
-    """Table of parameters with description, name, value and unit. Parameters that this version does not declare come
-    last, with name and value only.
+def parameters_table(
+    caption: str, kind: type[Parameters] | None, values: Mapping[str, Any], positional: str | None = None
+) -> Table:
+    """Table of parameters with description, option of the command line, value and unit. Parameters that this version
+    does not declare come last, with option and value only.
     """
     rows = list(_declared_rows(kind, values, "")) if kind is not None else []
     known = {row[1] for row in rows}
-    rows += [[ABSENT, name, text, ""] for name, text in flat(values).items() if name not in known]
+    rows += [[ABSENT, flag(name), text, ""] for name, text in flat(values).items() if flag(name) not in known]
+    if positional is not None:
+        rows = [[text, "FILE" if option == flag(positional) else option, *rest] for text, option, *rest in rows]
     columns = [
         Column("parameter", words=True),
-        Column("name", words=True),
+        Column("option", words=True),
         Column("value", words=True),
         Column("unit", words=True),
     ]
@@ -168,7 +175,7 @@ def _declared_rows(kind: type[Parameters], values: Mapping[str, Any], prefix: st
             yield from _declared_rows(entry.group, cast(dict[str, Any], value), f"{prefix}{entry.name}.")
             continue
         unit = unit_text(entry.unit) if value is not None else ""
-        yield [first_words(entry.description) or ABSENT, f"{prefix}{entry.name}", _text(value), unit]
+        yield [first_words(entry.description) or ABSENT, flag(f"{prefix}{entry.name}"), _text(value), unit]
 
 
 def _text(value: Any) -> str:

@@ -132,7 +132,7 @@ def campaign_report(campaign: Campaign, protocol: Protocol[Any] | None = None, p
         lambda: _results(campaign, protocol),
         lambda: [identified_section(campaign), fits_section(campaign)],
         lambda: _specimen(campaign),
-        lambda: [limits_section(campaign), provenance_section(campaign)],
+        lambda: [limits_section(campaign), provenance_section(campaign, protocol and protocol.positional)],
     ]
     sections: list[Section] = []
     for number, make in enumerate(makers):

@@ -141,7 +141,7 @@ def _accept(volts: float, seen: float, drift: float, binds: str) -> Generator[St
 
 
 def _headroom(signals: Array, sample_rate: float, configuration: BenchConfiguration) -> tuple[float, str]:
-    """Factor by which a motion may be scaled until it reaches `SHARE` of a limit, and the name of that limit."""
+    """Factor by which a motion may be scaled before it reaches `SHARE` of a limit, and the name of that limit."""
     # average over 20 ms: differences of single samples are dominated by noise
     many = max(round(0.02 * sample_rate), 1)
     rows = len(signals) // many

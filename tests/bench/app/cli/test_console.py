@@ -262,7 +262,7 @@ def test_the_twin_has_a_line_while_the_bench_is_driven() -> None:
     said = estimate(residual=0.0031, excess=NAN, drift_peak=0.01819, drift_peak_measured=0.01822, alpha_2=NAN)
     scene = scene_after([*CAMPAIGN, said])
     line = line_with(rendered(scene), "twin")
-    assert line == "twin  drift peak 18.22 mm, model 18.19 mm; residual 0.3 %, outside the band -"
+    assert line == "twin  drift peak 18.22 mm, model 18.19 mm; residual 0.3 %, excess over the band -"
     known = {"alpha_2": 0.3074, "alpha_2_low": 0.222, "alpha_2_high": 0.442, "alpha_2_measured": 0.3071}
     scene.update(dataclasses.replace(said, standing=0.975, **known))
     line_with(rendered(scene, width=160), "alpha_2 0.3071, model 0.3074 (0.2220 to 0.4420); blocks standing 98%")

@@ -194,7 +194,7 @@ def test_the_report_says_who_with_what_software_and_which_parameters(file: Path)
     assert known["operator"] == "N. N."
     assert "git 0123456789abcdef0123456789abcdef01234567, files changed since" in known["recorded by"]
     assert "git " in known["reported by"]
-    assert [column.title for column in parameters.columns] == ["parameter", "name", "value", "unit"]
+    assert [column.title for column in parameters.columns] == ["parameter", "option", "value", "unit"]
     rows = {row[1]: row for row in parameters.rows}
-    assert rows["decay"] == ["duration of the free vibration measured after a record", "decay", "5", "s"]
-    assert rows["records"][2] == "synthetic:pacoima"
+    assert rows["--decay"] == ["duration of the free vibration measured after a record", "--decay", "5", "s"]
+    assert rows["FILE"][2] == "synthetic:pacoima"
