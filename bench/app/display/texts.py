@@ -43,8 +43,8 @@ STOP_AGAIN = "STOP\nagain: CUT"
 STOP_BY_MOUSE = "STOP\nby mouse"
 KEY_NEEDS_FOCUS = "F12 works only while this window has the focus: click on it."
 STOP_TIP = (
-    "Ramps the output quickly to zero and ends the run (F12 while this window has the focus). If pressed again after "
-    "{after:g} s or more, cuts the enable line."
+    "Ramps the output quickly to zero and ends the run (F12; the bar says when the key needs the focus). If pressed "
+    "again after {after:g} s or more, cuts the enable line."
 )
 LATCHED = "STOP was pressed: clear it first"
 STOPPED = "STOP was pressed"
@@ -311,7 +311,8 @@ TROUBLE, TROUBLE_DETAILS, TROUBLE_CLOSE = "Needs attention", "Details", "Hide"
 TROUBLE_PARTS = ("Event", "Reaction of the bench", "Next step")
 TROUBLE_DETAILS_TIP = "Shows the full error message, for the developers (Ctrl+Shift+I)."
 TROUBLE_CLOSE_TIP = "Hides this message; it stays in the log and in the data file (Ctrl+Shift+H)."
-CONFIGURATION_TITLES = ("key", "value", "unit")
+CONFIGURATION_TITLES = ("parameter", "value", "unit")
+KEY_IN_FILE = "Key in the configuration file: `{key}`"
 OPEN_CONFIGURATION = "Open a configuration …"
 OPEN_CONFIGURATION_TIP = (
     "Opens another configuration file (TOML). If it is refused, the reason is shown and the current configuration "

@@ -17,6 +17,10 @@ from bench.config.model import BenchConfiguration
 from bench.document.typography import unit_text
 from sim.parameters import Parameters
 
+KEY = Qt.ItemDataRole.UserRole + 1
+"""Role of the key of an item in the configuration file, without the tables above it; the number of a group in a list.
+"""
+
 
 class ConfigurationTree(QTreeWidget):
     """Read-only view of a configuration. Values that differ from their defaults are bold. Top-level groups are
@@ -38,7 +42,7 @@ class ConfigurationTree(QTreeWidget):
         values, groups = list[QTreeWidgetItem](), list[QTreeWidgetItem]()
         for of in declared(BenchConfiguration):
             if of.name not in unused:
-                line = _line(of, getattr(configuration, of.name))
+                line = _line(of, getattr(configuration, of.name), of.name)
                 (groups if line.childCount() else values).append(line)
         self.addTopLevelItems([*values, *groups])
         for item in self._all():
@@ -50,7 +54,7 @@ class ConfigurationTree(QTreeWidget):
         items = [self.topLevelItem(k) for k in range(self.topLevelItemCount())]
         found: QTreeWidgetItem | None = None
         for key in path:
-            found = next((item for item in items if item is not None and item.text(0) == key), None)
+            found = next((item for item in items if item is not None and item.data(0, KEY) == key), None)
             if found is None:
                 raise KeyError(".".join(path))
             items = [found.child(k) for k in range(found.childCount())]
@@ -67,27 +71,29 @@ class ConfigurationTree(QTreeWidget):
         return found
 
 
-def _line(of: Declared, value: object) -> QTreeWidgetItem:
-    """Item of a key, with child items for the keys below it; its first column stores whether the value, or any value
-    below it, differs from the default.
+def _line(of: Declared, value: object, key: str) -> QTreeWidgetItem:
+    """Item of the dotted `key`, with child items for the keys below it; its first column stores whether the value, or
+    any value below it, differs from the default.
     """
     changed = value != of.default
-    item = QTreeWidgetItem([of.name, "", ""])
+    item = _item(of.name)
     if isinstance(value, Parameters):
-        _fill(item, value)
+        _fill(item, value, key)
         tip = of.description or summary(type(value))
     elif groups := _groups(value):
         for number, each in enumerate(groups):
-            below = QTreeWidgetItem([str(number + 1), "", ""])
-            _fill(below, each)
+            below = _item(str(number + 1))
+            _fill(below, each, key)
             item.addChild(below)
         tip = of.description
     else:
         item.setText(1, _words(value))
         item.setText(2, "" if of.unit == "1" or value is None else unit_text(of.unit))
         tip = f"{of.description}\n{texts.MUST_BE.format(allowed=of.allowed_in_unit)}"
-    for column in range(3):
-        item.setToolTip(column, typeset(tip[:1].upper() + tip[1:]))
+    tip = typeset(tip[:1].upper() + tip[1:])
+    item.setToolTip(0, f"{tip}\n{texts.KEY_IN_FILE.format(key=key)}")
+    for column in (1, 2):
+        item.setToolTip(column, tip)
     item.setData(0, Qt.ItemDataRole.UserRole, changed)
     font = item.font(1)
     font.setBold(changed)
@@ -95,9 +101,15 @@ def _line(of: Declared, value: object) -> QTreeWidgetItem:
     return item
 
 
-def _fill(item: QTreeWidgetItem, group: Parameters) -> None:
+def _item(name: str) -> QTreeWidgetItem:
+    item = QTreeWidgetItem([name.replace("_", " "), "", ""])
+    item.setData(0, KEY, name)
+    return item
+
+
+def _fill(item: QTreeWidgetItem, group: Parameters, key: str) -> None:
     for of in declared(type(group)):
-        item.addChild(_line(of, getattr(group, of.name)))
+        item.addChild(_line(of, getattr(group, of.name), f"{key}.{of.name}"))
 
 
 def _groups(value: object) -> list[Parameters]:

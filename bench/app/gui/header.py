@@ -23,6 +23,7 @@ from bench.app.display.theme import Theme
 from bench.app.display.typography import typeset
 from bench.app.formatting import clock
 from bench.app.gui.controller import DELIBERATE, Controller
+from bench.app.gui.global_key import GlobalKey
 from bench.app.gui.widgets import ElidingLabel, Lamp, give_key, set_level
 
 KEY = Qt.Key.Key_F12
@@ -156,6 +157,8 @@ class Header(QWidget):
         self.setFixedHeight(HEIGHT)
         controller.changed.connect(self.refresh)
         application().applicationStateChanged.connect(self.refresh)
+        self.key = GlobalKey(self)
+        self.key.pressed.connect(controller.press_stop)
         self.refresh()
 
     def fit(self, width: int, height: int) -> None:
@@ -177,7 +180,10 @@ class Header(QWidget):
         self.lamp.show_as(shown.shape, shown.level, on_red=controller.latched)
         self.word.setText(shown.word)
         set_level(self.word, shown.level)
-        key_acts = application().applicationState() == Qt.ApplicationState.ApplicationActive
+        active = application().applicationState() == Qt.ApplicationState.ApplicationActive
+        # while the window has the focus, `StopFilter` takes the key
+        self.key.hold(wanted=controller.running and not active)
+        key_acts = active or self.key.held
         # a header with details shows the step in a separate field
         reason = "" if shown.reason == scene.step and self.details.isVisibleTo(self) else shown.reason
         said = ([texts.STOPPED + "."] if controller.latched else []) + [typeset(reason)]

@@ -14,7 +14,7 @@ from bench.analysis.check_line import CheckLine, judged, stated
 from bench.app.catalogue import load_protocol
 from bench.app.display import texts
 from bench.app.display.typography import typeset
-from bench.app.gui.configuration_tree import ConfigurationTree
+from bench.app.gui.configuration_tree import KEY, ConfigurationTree
 from bench.app.gui.window import Window
 from bench.app.ipc.messages import Ended, Published, Run
 from bench.config.model import BenchConfiguration
@@ -55,7 +55,7 @@ def test_every_key_of_the_configuration_is_in_the_tree_with_its_unit(qtbot: QtBo
     tree.use(BenchConfiguration(backend="simulated"))
     write_template(tmp_path / "bench.toml")
     lines = (tmp_path / "bench.toml").read_text(encoding="utf-8").splitlines()
-    shown = [(item.text(0), item) for item in _leaves(tree)]
+    shown = [(str(item.data(0, KEY)), item) for item in _leaves(tree)]
     assert len(shown) > 60
     for name, item in shown:
         meaning = [above for above, line in pairwise(lines) if line.lstrip("# ").startswith(f"{name} = ")]
@@ -79,7 +79,7 @@ def test_values_are_those_of_the_bench_and_what_was_changed_is_bold(qtbot: QtBot
     assert tree.value("limits", "late") == "5 s"
     with pytest.raises(KeyError):
         tree.value("hardware", "sample_rate")
-    bold = {item.text(0) for item in _leaves(tree) if item.font(1).bold()}
+    bold = {item.data(0, KEY) for item in _leaves(tree) if item.font(1).bold()}
     assert {"block_duration", "late"} <= bold
     assert "laser_range" not in bold
 

@@ -23,8 +23,6 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from bench.app.gui.configuration_tree import ConfigurationTree
-
 ROLES = (Qt.ItemDataRole.DisplayRole, Qt.ItemDataRole.ToolTipRole)
 
 
@@ -60,9 +58,7 @@ def _texts(part: QWidget) -> Iterator[str]:
                 yield item.toPlainText()
     elif isinstance(part, QAbstractItemView) and not isinstance(part, QHeaderView):
         yield from _header_texts(part.model())
-        # the first column of the configuration has the keys of its file
-        first = 1 if isinstance(part, ConfigurationTree) else 0
-        yield from _model_texts(part.model(), QModelIndex(), first, deep=isinstance(part, QTreeWidget))
+        yield from _model_texts(part.model(), QModelIndex(), deep=isinstance(part, QTreeWidget))
 
 
 def _header_texts(model: QAbstractItemModel) -> Iterator[str]:
@@ -77,15 +73,13 @@ def _columns(model: QAbstractItemModel, parent: QModelIndex = QModelIndex()) -> 
     return 1 if isinstance(model, QAbstractListModel) else model.columnCount(parent)
 
 
-def _model_texts(
-    model: QAbstractItemModel, parent: QModelIndex, first: int = 0, *, deep: bool = False
-) -> Iterator[str]:
+def _model_texts(model: QAbstractItemModel, parent: QModelIndex, *, deep: bool = False) -> Iterator[str]:
     for row in range(model.rowCount(parent)):
-        for column in range(first, _columns(model, parent)):
+        for column in range(_columns(model, parent)):
             index = model.index(row, column, parent)
             yield from (str(text) for role in ROLES if (text := model.data(index, role)) is not None)
         if deep:
-            yield from _model_texts(model, model.index(row, 0, parent), first, deep=True)
+            yield from _model_texts(model, model.index(row, 0, parent), deep=True)
 
 
 def painted_texts(whole: QWidget, patch: pytest.MonkeyPatch) -> list[tuple[str, str]]:
