@@ -89,6 +89,7 @@ class Terminal(StringIO):
         return True
 
 
+@pytest.mark.seconds
 @pytest.mark.usefixtures("plugged")
 def test_its_live_number_is_on_the_terminal_while_it_runs(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     for name in ("NO_COLOR", "FORCE_COLOR", "TTY_COMPATIBLE", "TTY_INTERACTIVE"):
