@@ -61,8 +61,7 @@ class SessionState:
     def begin(self, run: Run, elapsed: float = 0.0) -> None:
         """Set the run, which was started `elapsed` seconds ago."""
         # a simulated bench that does not run in real time may be silent while the model computes
-        paced = run.realtime or run.configuration.real_time_only
-        self._longest_quiet = SILENCE + run.configuration.acquisition.block_duration if paced else inf
+        self._longest_quiet = SILENCE + run.configuration.acquisition.block_duration if run.paced else inf
         self.run, self._started = run, now() - elapsed
 
     @property

@@ -23,6 +23,10 @@ SILENCE = 1.0
 """Silence of the session process after which the client shows "no link" [s]."""
 PATIENCE = 3.0
 """Silence of the client after which the session considers it lost [s]."""
+VIRTUAL_PATIENCE = 60.0
+"""The same for a run in virtual time [s], which waits for its client after a silence of `SILENCE`. On a loaded computer
+the window's thread may receive no processor time for several seconds.
+"""
 
 
 @dataclass(frozen=True)
@@ -52,6 +56,11 @@ class Run(PlanCheck):
     person: bool = False
     keep_going: bool = False
     about: Mapping[str, str] = field(default_factory=dict[str, str])
+
+    @property
+    def paced(self) -> bool:
+        """Whether the bench runs in real time; otherwise its time stands still while the session computes or waits."""
+        return self.realtime or self.configuration.real_time_only
 
 
 @dataclass(frozen=True)

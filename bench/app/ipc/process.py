@@ -42,7 +42,8 @@ def serve(connection: Connection) -> None:
         if not keep_going:
             requests.stop(f"{why}, and the run was not set to continue without a client", CauseCode.CLIENT_LOST)
 
-    host = SessionServer(connection, requests, lost)
+    virtual = isinstance(assignment, Run) and not assignment.paced
+    host = SessionServer(connection, requests, lost, virtual=virtual)
     try:
         if isinstance(assignment, Run):
             with announced(host, assignment, "window"):

@@ -9,6 +9,7 @@ from dataclasses import replace
 from multiprocessing.connection import Connection
 from pathlib import Path
 from queue import Empty, SimpleQueue
+from time import sleep
 from typing import Any
 
 from bench.analysis.signals import further_of
@@ -16,6 +17,8 @@ from bench.app.ipc.broadcast import Broadcast, Reduction, SendQueue
 from bench.app.ipc.messages import (
     BEAT,
     PATIENCE,
+    SILENCE,
+    VIRTUAL_PATIENCE,
     Answer,
     Ask,
     Attached,
@@ -87,18 +90,20 @@ class SafetyWatch:
 
 _LOOK = 0.1
 """Interval [s] at which requests to end and the loss of the client are checked while waiting for the operator's
-answer.
+answer or for a silent client.
 """
 
 
 class SessionServer:
-    """Serves the clients of a session, each with a sending and a receiving thread; the engine waits for none of them.
+    """Serves the clients of a session, each with a sending and a receiving thread. The engine waits for none of them,
+    except for the owner in a `virtual` run.
 
     owner : connection to the client that started the session; None for a session that a terminal started.
     lost : called with the reason, in a receiving thread, when the owner has disconnected or is silent; may be called
         repeatedly.
     pending : called in a receiving thread; returns whether the main thread is not polling for requests at present and
         must therefore be interrupted.
+    virtual : whether the run is in virtual time, which may stand still.
 
     Clients that `attach` may abort or halt the run and, while the owner is lost, stop it and answer questions.
     """
@@ -109,8 +114,11 @@ class SessionServer:
         requests: Requests,
         lost: Callable[[str], None],
         pending: Callable[[], bool] = lambda: False,
+        *,
+        virtual: bool = False,
     ) -> None:
         self._requests, self._lost, self._pending = requests, lost, pending
+        self._virtual, self._patience = virtual, VIRTUAL_PATIENCE if virtual else PATIENCE
         self.broadcast = Broadcast()
         self.inputs = SafetyWatch(self.broadcast)
         self.answers = SimpleQueue[Answer]()
@@ -123,7 +131,7 @@ class SessionServer:
         self._attending: set[SendQueue] = set()
         self._sending: list[threading.Event] = []
         self._state, self._reason, self._time = State.IDLE, "", 0.0
-        self._noted = now()
+        self._noted = self._heard = now()
         if owner is not None:
             self._serve(owner, self.broadcast.join(), lambda: self._receive(owner))
 
@@ -145,6 +153,11 @@ class SessionServer:
         self._time = max(self._time, event.time)
         if isinstance(event, StateChanged):
             self._state, self._reason = event.after, event.reason
+
+    def wait_for_owner(self) -> None:
+        """In virtual time, wait while the owner is silent but not lost; to be called in the engine's thread."""
+        while self._virtual and self.connected and self._requests.strongest is None and now() - self._heard > SILENCE:
+            sleep(_LOOK)
 
     def publish_notes(self) -> None:
         """Publish the notes of the operator; to be called in the engine's thread."""
@@ -186,12 +199,13 @@ class SessionServer:
     def _receive(self, owner: Connection) -> None:
         try:
             while True:
-                if owner.poll(PATIENCE):
+                if owner.poll(self._patience):
                     message = receive(owner)
+                    self._heard = now()
                     self._find(present=True)
                     self._handle(message)
                 else:
-                    self._lose_client(f"the client has been silent for {PATIENCE:g} s")
+                    self._lose_client(f"the client has been silent for {self._patience:g} s")
         except (EOFError, OSError):
             self._lose_client("the client has disconnected")
 
@@ -315,6 +329,7 @@ class Publisher:
             if self._reduction is not None and self._host.broadcast.has_clients:
                 self._trace(self._reduction, event)
             self._host.inputs.update_driven(event.time)
+            self._host.wait_for_owner()
         elif not isinstance(event, ValuesReceived):
             self._host.broadcast.put(Published(event))
             if isinstance(event, StateChanged):
