@@ -83,7 +83,7 @@ def gain_figure(points: Sequence[PointLike], prediction: Mapping[str, NDArray[An
         panel.set_ylabel(r"$\alpha_2$", fontsize=9)
         panel.set_ylim(0.0, GAIN_HEADROOM * max(panel.get_ylim()[1] / GAIN_HEADROOM, 1.2))
         set_grid(panel)
-    add_legend(figure, panels, 3)
+    add_legend(figure, panels, min(columns, 3))
     return figure
 
 
