@@ -13,7 +13,7 @@ from bench.analysis.uncertainty import COVERAGE
 from bench.datafile.tables import arrays
 from bench.document.campaign import Campaign
 from bench.document.document import Column, Listing, Part, Picture, Section, Table
-from bench.document.typography import plain, with_uncertainty
+from bench.document.typography import plain, typeset, with_uncertainty
 from bench.figures.style import BLACK, BLUE, GREY, VERMILLION, new_figure, set_grid
 from bench.figures.text_table import TextColumn, text_table
 from protocols.common.budgets import budget_parts, budgeted
@@ -199,7 +199,7 @@ def stability_sections(campaign: Campaign) -> list[Section]:
     points = [StabilityPoint.model_validate(row) for row in campaign.points]
     points.sort(key=lambda point: (point.omega_rad_s, point.amplitude_factor))
     curve = arrays(campaign.record.tables["prediction"])
-    parts: list[Part] = [Listing(boundary_texts(points, curve))]
+    parts: list[Part] = [Listing([typeset(text) for text in boundary_texts(points, curve)])]
     caption = (
         "Multipliers of the held orbits after their release (markers, k = 2; filled: unstable) and their prediction "
         "(lines): modulus with the boundary and its interval, and the complex plane with the unit circle."
