@@ -7,14 +7,13 @@ markup.
 """
 
 import io
-import json
 import re
 from html import escape
-from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from bench.document.document import Document, Picture, template_content
+from bench.document.typesetting import Typesetter
 from bench.unfinished import temporary_folder
 
 if TYPE_CHECKING:
@@ -26,6 +25,9 @@ _OUTLINE = re.compile(r'( d=")([^"]+)(")')
 _DIGITS = re.compile(r"(\.\d\d)\d+")
 _RULE = re.compile(r"<defs>\s*<style.*?</style>\s*</defs>\s*", re.DOTALL)
 _OPENING = re.compile(r"<svg\b([^>]*)>")
+
+INCH = 72.0
+"""Points per inch."""
 
 WIDTH, HEIGHT = 6.77, 8.0
 """Largest size of a figure in a PDF [in]: the text area of an A4 page minus a heading, a paragraph and a caption of a
@@ -52,22 +54,25 @@ def html_page(document: Document) -> str:
 
 
 def write_pdf(path: Path, document: Document) -> None:
-    """Write the pages to `path`, replacing any existing file. Figures larger than a page are drawn smaller."""
-    import matplotlib
-    import typst
+    """Write the pages to `path`, replacing any existing file. Figures larger than a page are drawn smaller; a figure
+    that would leave a page partly blank is drawn at another height, or follows the next text of its section.
+    """
+    drawings: list[tuple[Picture, dict[str, Any]]] = []
 
+    def empty(picture: Picture, _number: int) -> dict[str, Any]:
+        width, height = _largest_size(picture.figure)
+        drawings.append((picture, {"file": None, "width": INCH * width, "height": INCH * height}))
+        return drawings[-1][1]
+
+    content = template_content(document, empty)
     with temporary_folder() as folder:
-
-        def draw(picture: Picture, number: int) -> str:
-            file = f"figure-{number}.pdf"
-            _save_pdf(picture.figure, folder / file)
-            return file
-
-        (folder / "report.json").write_text(json.dumps(template_content(document, draw)), encoding="utf-8")
-        template = folder / "report.typ"
-        template.write_bytes(files("bench.document").joinpath(template.name).read_bytes())
-        fonts = Path(matplotlib.get_data_path()) / "fonts" / "ttf"
-        path.write_bytes(typst.compile(template, font_paths=[fonts], ignore_system_fonts=True))
+        typesetter = Typesetter(folder, content)
+        typesetter.fill_pages(INCH * HEIGHT)
+        for number, (picture, drawing) in enumerate(drawings, 1):
+            drawing["file"] = f"figure-{number}.pdf"
+            size = drawing["width"] / INCH, drawing["height"] / INCH
+            _save_pdf(picture.figure, folder / drawing["file"], size)
+        path.write_bytes(typesetter.pdf())
 
 
 def _inline_svg(picture: Picture, number: int) -> str:
@@ -98,20 +103,24 @@ def _inline_svg(picture: Picture, number: int) -> str:
     return _OPENING.sub(lambda found: f"<svg {attributes}{found[1]}>{title}{description}", body, count=1)
 
 
-def _save_pdf(figure: "Figure", path: Path) -> None:
-    """Saves a figure no larger than a page; if the width is reduced, the height is reduced by the square root of the
-    same factor.
-
-    The figure is drawn at that size rather than scaled, so that its text keeps its size.
+def _largest_size(figure: "Figure") -> tuple[float, float]:
+    """Width and height of a figure in a PDF [in], no larger than a page; if the width is reduced, the height is reduced
+    by the square root of the same factor.
     """
-    import matplotlib
-
     width, height = (float(side) for side in figure.get_size_inches())
     narrower = min(1.0, WIDTH / width)
-    figure.set_size_inches(narrower * width, min(HEIGHT, height * narrower**0.5))
+    return narrower * width, min(HEIGHT, height * narrower**0.5)
+
+
+def _save_pdf(figure: "Figure", path: Path, size: tuple[float, float]) -> None:
+    """Saves a figure of `size` [in]. It is drawn at that size rather than scaled, so that its text keeps its size."""
+    import matplotlib
+
+    own = tuple(figure.get_size_inches())
+    figure.set_size_inches(*size)
     try:
         # embedded fonts instead of outlines, so that text can be searched and copied
         with matplotlib.rc_context({"pdf.fonttype": 42}):
             figure.savefig(path, format="pdf")
     finally:
-        figure.set_size_inches(width, height)
+        figure.set_size_inches(*own)
