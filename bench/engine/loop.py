@@ -150,10 +150,11 @@ class AtRest:
     def arm(self, step: Arm, specimen: Specimen | None) -> None:
         """Arm, wait until the storeys are still or the patience is exhausted, and tare the signals."""
         self._loop.begin("start of a test")
-        rest = self._stillness(step)
+        rest, still = self._stillness(step)
         self._guard.tare(rest, drift=self.measures_storeys)
         self._loop.fall = FallWatch(specimen, self._rig.sample_rate) if specimen else None
-        self._loop.output.machine.go(State.RUNNING, "storeys at rest, signals tared")
+        storeys = "storeys at rest" if still else "storeys still moving"
+        self._loop.output.machine.go(State.RUNNING, f"{storeys}, signals tared")
 
     def acquire(self, step: AcquireAtRest) -> RestSamples:
         """Acquire samples. An exceeded limit ends the acquisition but not the plan, because the table is not driven."""
@@ -179,20 +180,20 @@ class AtRest:
         output.rest()
         return RestSamples(self._rig.channels, np.concatenate(counts), violation, alignments)
 
-    def _stillness(self, step: Arm) -> NDArray[np.float64]:
-        """Channel values, shape (n, n_channels), of the first interval in which the storeys are still, or of the last
-        one if they are still moving after `patience`.
+    def _stillness(self, step: Arm) -> tuple[NDArray[np.float64], bool]:
+        """Channel values, shape (n, n_channels), of the first interval in which the storeys are still and True, or of
+        the last one and False if they are still moving after `patience`.
         """
         waited = 0.0
         while True:
             blocks = [self._loop.exchange() for _ in range(self._blocks(step.rest))]
             values = np.concatenate([each.values for each in blocks])
             if scatter(np.concatenate([each.signals for each in blocks])) <= step.still:
-                return values
+                return values, True
             waited += step.rest
             if waited >= step.patience:
                 self._stream.publish(Warned(f"the storeys are still moving after {waited:g} s; signals tared anyway"))
-                return values
+                return values, False
 
     def _blocks(self, duration: float) -> int:
         return max(round(duration * self._rig.sample_rate / self._loop.output.block), 1)

@@ -188,6 +188,10 @@ def test_a_limit_is_published_and_the_run_aborted() -> None:
     assert bench.ends_at_zero()
 
 
+def _reasons(bench: Bench) -> list[str]:
+    return [event.reason for event in bench.events if isinstance(event, StateChanged)]
+
+
 def _others() -> dict[str, Callable[[np.ndarray], np.ndarray]]:
     return {
         "table_acceleration": lambda v: v,
@@ -434,6 +438,7 @@ def test_the_zero_is_taken_when_the_storeys_are_still_or_with_a_warning_when_the
     bench.run(_plan(MOUNT, Arm(0.5), RampOut()))
     assert bench.rig.clock.now() > 2.0
     assert not any(isinstance(event, Warned) for event in bench.events)
+    assert "storeys at rest, signals tared" in _reasons(bench)
 
     shaking = LoopbackRig(
         {"table_displacement": lambda v: 0.0 * v, **_others(), "laser_2": lambda v: 0.02 * np.sin(np.arange(v.size))}
@@ -442,6 +447,8 @@ def test_the_zero_is_taken_when_the_storeys_are_still_or_with_a_warning_when_the
     bench.run(_plan(MOUNT, Arm(0.5, patience=2.0), RampOut()))
     (warning,) = [event for event in bench.events if isinstance(event, Warned)]
     assert "still moving after 2 s" in warning.text
+    assert "storeys still moving, signals tared" in _reasons(bench)
+    assert not any("at rest" in reason for reason in _reasons(bench))
 
 
 @pytest.mark.parametrize(
