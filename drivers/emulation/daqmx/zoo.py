@@ -125,7 +125,7 @@ CHASSIS: dict[str, tuple[int, DeviceModel]] = {
 
 def _x_series(product: str, *, transfer_condition: bool) -> DeviceModel:
     """An NI 6351. Its multiplexed converter samples one channel at up to 1.25 MS/s, or several channels at 1 MS/s in
-    total (6368 User Manual, table 4-5).
+    total (X Series User Manual, "Analog Input", "Aggregate versus Single Channel Sample Rates").
 
     Its watchdog acts on digital lines only (X Series User Manual, "Digital Output", "Watchdog Timer"). It has four
     counters (X Series User Manual, "Counters").
