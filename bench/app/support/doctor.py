@@ -49,6 +49,11 @@ class Finding:
     remedy: str = ""
 
 
+def _not_checked(item: str, remedy: str) -> Finding:
+    """Finding of a check that exists only for other operating systems."""
+    return Finding(item, Health.UNKNOWN, "not checked on this platform", remedy)
+
+
 def examine(folder: Path, port: str | None = None) -> Iterator[Finding]:
     """Check this computer for runs with results in `folder`; `port` is the address host:port of a device server.
 
@@ -128,11 +133,15 @@ def disk_speed(folder: Path) -> Finding:
     )
 
 
-def power(governor: Path = Path("/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor")) -> Finding:
-    """Check whether the processor's frequency governor saves power; unknown on systems other than Linux."""
-    item = "power settings"
+def power(
+    governor: Path = Path("/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor"), system: str = sys.platform
+) -> Finding:
+    """Check whether the processor's frequency governor saves power; on Linux only."""
+    item, remedy = "power settings", "switch off sleep and USB suspend during runs"
+    if system != "linux":
+        return _not_checked(item, remedy)
     if not governor.is_file():
-        return Finding(item, Health.UNKNOWN, "not determined", "switch off sleep and USB suspend during runs")
+        return Finding(item, Health.UNKNOWN, "not determined", remedy)
     mode = governor.read_text(encoding="utf-8").strip()
     if mode in ("powersave", "conservative"):
         return Finding(item, Health.NOTICE, f"governor {mode}", "select the performance governor")
@@ -152,10 +161,12 @@ def sleep(which: Callable[[str], str | None] = shutil.which, system: str = sys.p
 
 
 def usb_suspend(devices: Path = Path("/sys/bus/usb/devices"), system: str = sys.platform) -> Finding:
-    """Check whether NI's USB devices and serial adapters can be suspended when idle."""
+    """Check whether NI's USB devices and serial adapters can be suspended when idle; on Linux and Windows only."""
     item = "USB suspend"
     if system == "win32":
         return _windows_usb_suspend(_answer("powercfg", "/query", "SCHEME_CURRENT", "SUB_USB", _SELECTIVE))
+    if system != "linux":
+        return _not_checked(item, "switch off the suspension of idle USB devices")
     suspended = [path.parent.parent for path in sorted(devices.glob("*/power/control")) if _read(path) == "auto"]
     ours = [device.name for device in suspended if _read(device / "idVendor") in _VENDORS]
     if not ours:
@@ -199,9 +210,16 @@ def _read(path: Path) -> str:
         return ""
 
 
-def serial_ports(adapters: Path = Path("/sys/bus/usb-serial/devices"), devices: Path = Path("/dev")) -> Finding:
+def serial_ports(
+    adapters: Path = Path("/sys/bus/usb-serial/devices"),
+    devices: Path = Path("/dev"),
+    system: str = sys.platform,
+) -> Finding:
     """Check the latency timers of serial adapters, and the permission to open their ports; on Linux only."""
-    item, found = "serial ports", sorted(adapters.glob("*")) if adapters.is_dir() else []
+    item = "serial ports"
+    if system != "linux":
+        return _not_checked(item, f"set the latency timer of serial adapters to {LATENCY} ms in the driver's settings")
+    found = sorted(adapters.glob("*")) if adapters.is_dir() else []
     if not found:
         return Finding(item, Health.GOOD, "no serial adapter")
     for adapter in found:
@@ -214,13 +232,15 @@ def serial_ports(adapters: Path = Path("/sys/bus/usb-serial/devices"), devices: 
     return Finding(item, Health.GOOD, ", ".join(adapter.name for adapter in found))
 
 
-def opengl(cards: Path = Path("/dev/dri")) -> Finding:
+def opengl(cards: Path = Path("/dev/dri"), system: str = sys.platform) -> Finding:
     """Check whether the window is installed and, on Linux, whether a graphics card is present."""
     if importlib.util.find_spec("PySide6") is None:
         return Finding(
             "OpenGL", Health.NOTICE, "the window is not installed", "to use the window, install rocking-bench[gui]"
         )
-    if sys.platform == "linux" and not cards.is_dir():
+    if system != "linux":
+        return _not_checked("OpenGL", "if the window stays blank, update the graphics driver")
+    if not cards.is_dir():
         return Finding(
             "OpenGL", Health.NOTICE, "no graphics card", "render the window in software: set LIBGL_ALWAYS_SOFTWARE=1"
         )

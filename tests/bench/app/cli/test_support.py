@@ -33,14 +33,23 @@ def test_a_slow_serial_adapter_and_a_power_saver_are_found(tmp_path: Path) -> No
         folder.mkdir(parents=True)
     port.touch()
     (adapter / "latency_timer").write_text("16\n")
-    found = doctor.serial_ports(tmp_path / "usb", tmp_path / "dev")
+    found = doctor.serial_ports(tmp_path / "usb", tmp_path / "dev", "linux")
     assert (found.health, "latency_timer" in found.remedy) == (Health.BAD, True)
     (adapter / "latency_timer").write_text("1\n")
-    assert doctor.serial_ports(tmp_path / "usb", tmp_path / "dev").health is Health.GOOD
+    assert doctor.serial_ports(tmp_path / "usb", tmp_path / "dev", "linux").health is Health.GOOD
     governor = tmp_path / "governor"
     governor.write_text("powersave\n")
-    assert doctor.power(governor).health is Health.NOTICE
+    assert doctor.power(governor, "linux").health is Health.NOTICE
     assert doctor.device_server("127.0.0.1:1").health is Health.BAD
+
+
+@pytest.mark.parametrize("system", ["win32", "darwin"])
+def test_what_is_checked_on_linux_only_is_not_called_good_elsewhere(system: str) -> None:
+    found = [doctor.power(system=system), doctor.serial_ports(system=system), doctor.opengl(system=system)]
+    if system == "darwin":
+        found.append(doctor.usb_suspend(system=system))
+    assert {(each.health, each.found) for each in found} == {(Health.UNKNOWN, "not checked on this platform")}
+    assert all(each.remedy for each in found)
 
 
 def test_a_report_has_log_configuration_versions_and_data(tmp_path: Path, capsys: Said) -> None:
