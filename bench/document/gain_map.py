@@ -1,6 +1,7 @@
 """Gain surface and map as in Fig. 4 of the paper: a section of a report."""
 
 from collections.abc import Sequence
+from math import isqrt
 
 import numpy as np
 
@@ -19,16 +20,21 @@ ranges.
 """
 
 MOST = 20_000
-"""Number of points to which a map is limited, approximately."""
+"""Largest number of points of a map."""
 
 
-def map_section(specimen: Specimen, amplitude_factor: float, measured: Sequence[MapPoint] = ()) -> Section:
-    """Section with the gain surfaces and maps of both steady motions, rocking and resting, and the measured points."""
-    request = MapRequest(
+def map_request(amplitude_factor: float, measured: Sequence[MapPoint] = ()) -> MapRequest:
+    """Frequencies and stiffness ratios of a map that includes the `measured` points; at most `MOST` points."""
+    return MapRequest(
         omega=_axis(LOW, HIGH, STEP, [point.omega for point in measured], 0.5),
         beta=_axis(BETA_LOW, BETA_HIGH, BETA_STEP, [point.beta for point in measured], 0.05),
         amplitude_factor=amplitude_factor,
     )
+
+
+def map_section(specimen: Specimen, amplitude_factor: float, measured: Sequence[MapPoint] = ()) -> Section:
+    """Section with the gain surfaces and maps of both steady motions, rocking and resting, and the measured points."""
+    request = map_request(amplitude_factor, measured)
     columns = arrays(map_table(specimen, request))
 
     def grid_of(name: str) -> BranchGrid:
@@ -63,5 +69,5 @@ def _axis(low: float, high: float, step: float, places: Sequence[float], margin:
     least = min([low, *(place - margin for place in places if place < low)])
     most = max([high, *(place + margin for place in places if place > high)])
     least = max(least, step)
-    count = min(round((most - least) / step), int(MOST**0.5)) + 1
+    count = min(round((most - least) / step) + 1, isqrt(MOST))
     return spaced(f"{least:.6g}", f"{most:.6g}", count)
