@@ -214,7 +214,9 @@ class Campaign:
         if signal not in self.signals:
             raise InvalidInput("signal", signal, f"it must be one of {', '.join(self.signals)}")
         if run is not None and run not in [each.number for each in self.runs]:
-            raise InvalidInput("run", run, f"the file contains runs 1 to {len(self.runs)}")
+            several = f"the file contains runs 1 to {len(self.runs)}"
+            allowed = {0: "the file contains no run", 1: "the file contains only run 1"}
+            raise InvalidInput("run", run, allowed.get(len(self.runs), several))
         times, values = [np.empty(0)], [np.empty(0)]
         for each, stored in zip(self.runs, self._file.runs, strict=True):
             specimen = each.beta is not None if isinstance(coupled, bool) else each.beta

@@ -8,6 +8,7 @@ from time import monotonic
 from typing import Any
 
 from bench.app.formatting import ABSENT, difference, measurement, number, one_line, plus_minus, setpoint
+from bench.document.typography import counted
 from bench.events import Event, PointFinished, Progress, State, StateChanged, StepStarted
 from bench.live_values import Estimate, LiveValue, RunningGain, TwinEstimate
 
@@ -45,8 +46,10 @@ class Row:
         value, predicted = point.get("alpha_2"), point.get("alpha_2_predicted")
         agrees, starts = point.get("agrees"), point.get("starts_tried")
         unstable = point.get("predicted_stable") is False
-        passes = f"{point.get('passes', 0)} passes"
-        effort = f"{point['cycles_measured']} cycles" if "cycles_measured" in point else passes
+        if "cycles_measured" in point:
+            effort = counted(point["cycles_measured"], "cycle")
+        else:
+            effort = counted(point.get("passes", 0), "pass", "passes")
         return Row(
             omega=one_line(str(point["record"])) if "record" in point else setpoint(point.get("omega_rad_s")),
             beta=setpoint(point.get("beta")),
@@ -71,7 +74,7 @@ class Row:
             predicted=number(estimate.predicted),
             difference=difference(estimate.alpha_2, estimate.predicted),
             agrees=ABSENT,
-            effort=f"{estimate.cycles} cycles",
+            effort=counted(estimate.cycles, "cycle"),
         )
 
     @staticmethod

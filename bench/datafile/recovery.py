@@ -111,7 +111,7 @@ class Recovery:
     @property
     def loss(self) -> str:
         """Description of the losses; empty if there are none."""
-        return ", ".join(f"{count} rows of {part}" for part, count in self.lost.items())
+        return ", ".join(f"{count} {'row' if count == 1 else 'rows'} of {part}" for part, count in self.lost.items())
 
 
 def write_ends(record: DataFile, path: Path, entry: hdf5.Group, lengths: Mapping[str, int], loss: str) -> None:
@@ -141,8 +141,8 @@ def write_note(record: DataFile, path: Path, entry: hdf5.Group, result: Recovery
     """Add a note: the lines of earlier recoveries, a line about this recovery, and a line for each damaged object."""
     recovered = (
         f"from {path.name} of format {record.format_version}: {result.rows} samples per channel kept,"
-        f" {result.loss or 'no rows'} lost, {result.from_journal} events and {result.points_from_journal} points from"
-        " the journal"
+        f" {result.loss or 'no rows'} lost; rows from the journal: {result.from_journal} of events,"
+        f" {result.points_from_journal} of points"
     )
     before = [f"damaged before: {each}" for each in result.damage]
     note = hdf5.create_group(entry, NOTE, "NXnote")

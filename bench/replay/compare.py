@@ -14,6 +14,7 @@ from bench.datafile.declared import ENTRY_PATHS, EVENT_TABLES, event_table
 from bench.datafile.fields import TEXT_WIDTH
 from bench.datafile.hdf5 import clip_text
 from bench.datafile.reader import DataFile
+from bench.document.typography import counted
 from bench.events import Acquired, Event, PointFinished, SensorsAligned
 from bench.live_values import TwinEstimate
 from bench.replay.course import RecordedCourse
@@ -139,7 +140,7 @@ class Comparison:
             if index >= begin and not (was_kind == kind and same):
                 was, now = f"{was_kind} {was_text!r}", f"{kind} {text!r}"
                 if not same_wording:
-                    was, now = f"{was} after {was_blocks} blocks", f"{now} after {blocks}"
+                    was, now = f"{was} after {counted(was_blocks, 'block')}", f"{now} after {blocks}"
                 found.differences.append(Difference(f"journal entry {index + 1} was {was} and is {now}", JOURNAL))
                 return came
         if broken_off is None and len(stored) > len(came):
@@ -205,7 +206,9 @@ def _compare_rows(
     """
     found.compared[what] = len(came)
     if len(stored) != len(came):
-        found.differences.append(Difference(f"{len(stored)} rows of {what} recorded, {len(came)} replayed", what))
+        found.differences.append(
+            Difference(f"{counted(len(stored), 'row')} of {what} recorded, {len(came)} replayed", what)
+        )
     largest, scales = 0.0, _scales(stored)
     for number, (was, now) in enumerate(zip(stored, came, strict=False), 1):
         for name in (now.keys() & was.keys()) - {"time"}:

@@ -13,6 +13,7 @@ from bench.control.passes import Pass
 from bench.control.replication import Replication, ReplicationParameters, Status
 from bench.control.table_model import TableModel
 from bench.control.target import Target
+from bench.document.typography import counted
 from bench.engine.steps import Arm, Fallen, Outcome, Play, Played, Publish, RampOut, Step
 from bench.events import Event, StepStarted, Warned, event
 from bench.guard.limits import Limits
@@ -148,7 +149,7 @@ def _replicated(replication: Replication, achieved: Array | None, *, fell: bool,
     reasons: dict[Ending, str] = {
         "running": "the block fell",
         "converged": "the tolerances are met",
-        "out of passes": f"the limit of {replication.parameters.passes} passes was reached",
+        "out of passes": f"the limit of {counted(replication.parameters.passes, 'pass', 'passes')} was reached",
         "limited": f"the next correction is not played: {replication.verdict}",
         "samples lost": f"samples of the table's motion were missing in both attempts at the pass ({lost} in the "
         "second)",

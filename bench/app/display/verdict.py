@@ -10,7 +10,7 @@ from bench.app.display.point_table import rows_of
 from bench.app.display.typography import typeset
 from bench.app.formatting import difference, measurement, number, plus_minus
 from bench.datafile.tables import Column
-from bench.document.typography import unit_text
+from bench.document.typography import counted, unit_text
 from bench.live_values import Estimate, LiveValue, RunningGain
 from bench.protocol import RunView
 from sim.parameters import Parameters, unit_of
@@ -40,7 +40,7 @@ def running_verdict(event: Estimate | RunningGain | LiveValue) -> str:
         uncertainty = event.uncertainty if isinstance(event, Estimate) else nan
         value = f"{texts.ALPHA} {plus_minus(own, uncertainty)}" if isfinite(own) else texts.NO_GAIN
         effort = (
-            texts.CYCLES.format(cycles=event.cycles)
+            counted(event.cycles, "cycle")
             if isinstance(event, Estimate)
             else texts.SO_FAR.format(seconds=event.seconds, record=event.record)
         )
