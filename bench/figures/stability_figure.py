@@ -1,5 +1,5 @@
 # pyright: reportUnknownMemberType=false
-"""Modulus of the slowest-decaying Floquet multiplier against frequency, on fixed ground and on the table; one panel per
+"""Largest modulus of the Floquet multipliers against frequency, on fixed ground and on the table; one panel per
 stiffness.
 """
 
@@ -21,7 +21,7 @@ Values = Mapping[str, NDArray[Any]]
 
 
 def stability_figure(points: Values, boundaries: Values) -> "Figure":
-    """Slowest-decaying Floquet multiplier against frequency; a circle marks a stability boundary.
+    """Largest modulus of the Floquet multipliers against frequency; a circle marks a stability boundary.
 
     `points` and `boundaries` are the columns of the tables from `bench.prediction.stability`.
     """
@@ -47,7 +47,7 @@ def stability_figure(points: Values, boundaries: Values) -> "Figure":
         panel.set_title(rf"$\beta$ = {beta:g}", color=GREY if not rows.any() else BLACK)
         panel.set_xlabel(r"$\Omega$  [rad/s]")
         if k % across == 0:
-            panel.set_ylabel(r"slowest multiplier  $|\mu|$")
+            panel.set_ylabel(r"largest modulus  $|\mu|$")
         set_grid(panel)
     add_legend(figure, panels, columns=3)
     return figure

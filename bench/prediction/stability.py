@@ -31,8 +31,8 @@ REAL = 0.02
 def multipliers_table(
     specimen: Specimen, shaker: Shaker, request: StabilityRequest, progress: Progress = silent
 ) -> Table:
-    """Table with one row per rocking orbit, by stiffness and ascending frequency: its gain, and its slowest-decaying
-    multiplier on fixed ground and on the table; NaN where no orbit was found on the table.
+    """Table with one row per rocking orbit, by stiffness and ascending frequency: its gain, and its multiplier with the
+    largest modulus on fixed ground and on the table; NaN where no orbit was found on the table.
     """
     found = predict_spectra(specimen, request, progress)
     branches = [(each.beta, each.omega, each.rocking) for each in found if each.rocking is not None]
@@ -114,7 +114,7 @@ def boundaries_table(
 
 
 def _slowest(orbit: Orbit, ground: str, shaker: Shaker, harmonics: int) -> complex:
-    """Slowest-decaying multiplier on one of GROUNDS; UNKNOWN if no orbit is found on the table."""
+    """Multiplier with the largest modulus on one of GROUNDS; UNKNOWN if no orbit is found on the table."""
     if ground == "fixed ground":
         return orbit.slowest
     try:

@@ -17,6 +17,7 @@ from bench.app.cli.main import main
 from bench.figures.history_figure import Motion, history_figure
 from bench.figures.map_figure import BranchGrid, least_over_omega, levels_for, map_figure
 from bench.figures.modes_figure import modes_figure
+from bench.figures.stability_figure import stability_figure
 from bench.figures.style import GREEN, PURPLE, VERMILLION, new_figure, write_figure
 from sim.errors import InvalidInput
 from sim.specimen import Specimen
@@ -316,3 +317,19 @@ def test_the_suffix_names_the_format_and_no_figure_is_overwritten(tmp_path: Path
     with pytest.raises(InvalidInput, match="never overwritten"):
         write_figure(path, new_figure(2.0, 2.0))
     assert [each.name for each in tmp_path.iterdir()] == [path.name]
+
+
+def test_the_modulus_of_multipliers_is_drawn_by_ground_with_its_boundaries() -> None:
+    points = {
+        "beta": np.array([0.4, 0.4]),
+        "omega_rad_s": np.array([15.0, 16.0]),
+        "modulus": np.array([0.99, 1.02]),
+        "table_modulus": np.array([0.97, 0.98]),
+    }
+    boundaries = {"beta": np.array([0.4]), "ground": np.array(["fixed ground"]), "omega_rad_s": np.array([15.4])}
+    (panel,) = stability_figure(points, boundaries).axes
+    # a growing motion does not decay slowly: the modulus is the largest, whatever its size
+    assert panel.get_ylabel() == r"largest modulus  $|\mu|$"
+    drawn = {line.get_label(): line.get_ydata() for line in panel.lines}
+    np.testing.assert_array_equal(drawn["fixed ground"], points["modulus"])
+    np.testing.assert_array_equal(drawn["table"], points["table_modulus"])
