@@ -122,7 +122,7 @@ def _text(fits: "StrokeFits") -> str:
     rows = [["before", *_numbers(fits.unfitted), *["-"] * len(changes)]]
     for method, motion in fits.fitted.items():
         change = _change(fits, motion)
-        shares = [*change["change_at_own_periods"], change["change_rms"], change["change_most"]]
+        shares = [*change["change_at_own_periods"], change["change_rms"], change["change_max"]]
         rows.append([str(method), *_numbers(motion), *(f"{100.0 * share:+.2f}" for share in shares)])
     rows += [[str(method), *["refused"] * (len(columns) - 1)] for method in fits.refused]
     record, reach = fits.record, fits.reach
@@ -201,12 +201,12 @@ def _change(fits: "StrokeFits", motion: "PreparedMotion") -> dict[str, Any]:
 
     if motion.fit is None:
         return {}
-    rms, most = change_over(motion.fit)
+    rms, largest = change_over(motion.fit)
     return {
         "own_periods_s": fits.own.tolist(),
         "change_at_own_periods": change_at(motion.fit, fits.own).tolist(),
         "change_rms": rms,
-        "change_most": most,
+        "change_max": largest,
     }
 
 

@@ -52,6 +52,8 @@ def test_both_methods_are_compared_and_the_spectra_are_those_of_the_motions(
     after = pseudo_acceleration(record.acceleration, record.dt, np.concatenate((PERIODS, good["own_periods_s"])))
     spectrum = answer["response_spectrum"]
     assert np.interp(PERIODS, spectrum["period_s"], spectrum["least-change_m_s2"]) == pytest.approx(after[:-2])
+    reference = np.interp(PERIODS, spectrum["period_s"], spectrum["before_m_s2"])
+    assert good["change_max"] == pytest.approx(np.abs(after[:-2] / reference - 1.0).max(), abs=1e-9)
     before = np.interp(good["own_periods_s"], spectrum["period_s"], spectrum["before_m_s2"])
     assert good["change_at_own_periods"] == pytest.approx(after[-2:] / before - 1.0, abs=1e-9)
     t = np.arange(record.acceleration.size) * record.dt
