@@ -16,13 +16,12 @@ from typing import IO
 from drivers.child import ChildProcess, ignore_requests
 from drivers.clock import now
 from drivers.daqmx.parameters import Daq
+from drivers.timebase.marking import GOLDEN
 from sim import waiting
 
 _READING = struct.Struct("<dqd")
 _PACE = 0.01
 """Pause between two readings [s]."""
-_GOLDEN = 0.6180339887498949
-"""Phase step between consecutive readings [sample periods]; its multiples are evenly distributed over a period."""
 _IDLE = 0.02
 _MOST = 10_000
 
@@ -73,7 +72,8 @@ def _serve(name: str, rate: float, daq: Daq, readings: IO[bytes]) -> None:
     stream = library.task(name, connection.attaching(name)).in_stream
     phase = 0.0
     while True:
-        phase = (phase + _GOLDEN) % 1.0
+        # the readings are distributed evenly over a sample period
+        phase = (phase + GOLDEN) % 1.0
         time.sleep(_PACE)
         deadline = now() + phase / rate
         while now() < deadline:

@@ -24,7 +24,7 @@ from drivers.hardware.parameters import Hardware
 from drivers.hardware.tracks import Tracks, open_serial_lasers
 from drivers.rig import Alignment, Block, Channel, Counts, OperatorTask, RawValues
 from drivers.timebase.deskew import Deskew
-from drivers.timebase.marking import Pulses, golden_pulses
+from drivers.timebase.marking import GOLDEN, Pulses, golden_pulses
 
 _SETTLING = 0.05
 """Shortest time between the end of the pulses and the first sample of a run [s]."""
@@ -33,8 +33,6 @@ _CHUNK = 0.1
 _FIRST_READINGS = 20
 """Number of readings of the sample clock directly after its start, when there are no earlier ones."""
 
-_GOLDEN = 0.6180339887498949
-"""Phase step between consecutive readings [sample periods]; its multiples modulo 1 cover a period almost evenly."""
 _READINGS = 6
 """Number of readings of the sample clock after each block; several readings bound the clock more tightly than one."""
 
@@ -204,7 +202,7 @@ class HardwareRig(RigBase):
         if self._watch is not None and self._watch.alive and (watched or times == _FIRST_READINGS):
             return
         for _ in range(times):
-            self._phase = (self._phase + _GOLDEN) % 1.0
+            self._phase = (self._phase + GOLDEN) % 1.0
             self.clock.wait_until(now() + self._phase / self.sample_rate)
             before = now()
             count = self._daq.acquired()

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-_GOLDEN = 0.6180339887498949
+GOLDEN = 0.6180339887498949
+"""Golden-ratio fraction: its multiples modulo 1 are distributed almost evenly over the unit interval."""
 _EDGES = 40
 _SPACING = 0.0125
 """Approximate time between two pulses [s]."""
@@ -47,7 +48,7 @@ class Pulses:
 
 def golden_pulses(rate: float) -> Pulses:
     """Pulses for the alignment of a sensor with measuring rate `rate` [1/s]."""
-    half = 0.5 * (max(round(_SPACING * rate), _CYCLES) + _GOLDEN) / rate
+    half = 0.5 * (max(round(_SPACING * rate), _CYCLES) + GOLDEN) / rate
     return Pulses(_BEGIN, half, half, _EDGES)
 
 
