@@ -1,9 +1,13 @@
 """Base classes of the errors that this software raises deliberately."""
 
 import errno
+from collections.abc import Sequence
 from dataclasses import dataclass
+from datetime import date, time
 from enum import StrEnum
-from typing import ClassVar
+from numbers import Number
+from pathlib import Path
+from typing import ClassVar, cast
 
 
 class CauseCode(StrEnum):
@@ -68,7 +72,7 @@ class InvalidInput(RockbenchError, ValueError):
     error_code = "invalid_input"
 
     def __init__(self, item: str, value: object, allowed: str) -> None:
-        super().__init__(f"{item} = {value!r} is refused: {allowed}")
+        super().__init__(f"{item} = {_shown(value)} is refused: {allowed}")
         self.item = item
         self.value = value
         self.allowed = allowed
@@ -77,6 +81,29 @@ class InvalidInput(RockbenchError, ValueError):
     def cause(self) -> Cause:
         """Error code, with the item as subject."""
         return Cause(self.error_code, self.item)
+
+
+def as_text(value: object) -> str:
+    """A refused value as text: an object that is neither a number nor a path or date is described by its type, since
+    its representation in Python names no quantity.
+    """
+    if value is None or isinstance(value, str | Number | Path | date | time):
+        return str(value)
+    return f"an object of type {type(value).__name__}"
+
+
+def _shown(value: object) -> str:
+    """A refused value in a message: text in quotes, the items of a list each on their own."""
+    match value:
+        case list() | tuple():
+            inner = ", ".join(_shown(each) for each in cast("Sequence[object]", value))
+            return f"[{inner}]" if isinstance(value, list) else f"({inner})"
+        case str() | Path() | date() | time():
+            return repr(as_text(value))
+        case dict():
+            return "a table"
+        case _:
+            return as_text(value)
 
 
 _OF_DISK = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO, errno.EFBIG})

@@ -86,7 +86,7 @@ class SineProgram:
                 raise InvalidInput("duration of a sweep", sweep.duration, "it must be a positive duration in s")
             if min(sweep.omega) <= 0.0:
                 raise InvalidInput(
-                    "omega of a sweep", sweep.omega, "both circular frequencies [rad/s] must be positive"
+                    "omega of a sweep", min(sweep.omega), "both circular frequencies [rad/s] must be positive"
                 )
         self.sweeps = tuple(sweeps)
         self.phase = phase

@@ -3,9 +3,9 @@
 Front end to `sim.kernel.rocking` with named types and checks.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from enum import IntEnum, StrEnum
-from math import ceil, log, log10, nan, pi
+from math import ceil, isfinite, log, log10, nan, pi
 from typing import Literal
 
 import numpy as np
@@ -159,11 +159,12 @@ def check_options(tolerance: float, overturning_angle: float) -> None:
 
 def check_state(specimen: Specimen, state: State, overturning_angle: float) -> None:
     """Raise InvalidInput for an invalid initial state."""
-    x = state.as_array()
-    if not np.isfinite(x).all():
-        raise InvalidInput("state", state, "all of its components must be finite")
-    if specimen.beta is None and state.mode is not Mode.REST:
-        raise InvalidInput("state", state, "the bare frame has no block: theta and omega must be 0")
+    components = {each.name: getattr(state, each.name) for each in fields(state)}
+    for name, value in components.items():
+        if not isfinite(value):
+            raise InvalidInput(name, value, "it must be finite at the start")
+        if specimen.beta is None and name in ("theta", "omega") and value != 0.0:
+            raise InvalidInput(name, value, "the bare frame has no block: it must be 0")
     if abs(state.theta) >= overturning_angle:
         raise InvalidInput("theta", state.theta, f"its magnitude must be below {overturning_angle:g} rad at the start")
     if specimen.beta and abs(state.u1) >= specimen.d:

@@ -204,13 +204,14 @@ def budget(
     matrix = np.eye(len(names))
     for (one, other), coefficient in (correlation or {}).items():
         if one not in names or other not in names or one == other or not -1.0 <= coefficient <= 1.0:
-            allowed = "it must be two different parameters that have an uncertainty, with a coefficient from -1 to 1"
-            raise InvalidInput("correlation", ((one, other), coefficient), allowed)
+            allowed = "it must be from -1 to 1, between two different parameters that have an uncertainty"
+            raise InvalidInput(f"correlation of {one} and {other}", coefficient, allowed)
         i, j = names.index(one), names.index(other)
         matrix[i, j] = matrix[j, i] = coefficient
     if names and float(np.linalg.eigvalsh(matrix).min()) < -1e-12:
         allowed = "these correlations contradict each other: the correlation matrix has a negative eigenvalue"
-        raise InvalidInput("correlation", dict(correlation or {}), allowed)
+        given = ", ".join(f"{one} and {other}: {value:g}" for (one, other), value in (correlation or {}).items())
+        raise InvalidInput("correlation", given, allowed)
     rows = [(sensitivities[name].alpha_1, sensitivities[name].alpha_2) for name in names]
     parts = np.array(rows).reshape(-1, 2) * np.array(list(standard_uncertainties.values()))[:, None]
     alpha_1, alpha_2 = np.sqrt(np.maximum(np.einsum("ia,ij,ja->a", parts, matrix, parts), 0.0)).tolist()

@@ -309,13 +309,18 @@ def _known(
 
 
 def _accelerogram(given: Record) -> Accelerogram:
-    if isinstance(given, Accelerogram):
-        return given
-    if not isinstance(given, tuple):
-        return RecordReference.parse(str(given)).read()
-    acceleration, dt = np.asarray(given[0], np.float64), float(given[1])
-    digest = sha256(acceleration.tobytes()).hexdigest()
-    return Accelerogram("array", acceleration, dt, "array", "array", "m/s2", digest, {})
+    match given:
+        case Accelerogram():
+            return given
+        case str() | PathLike():
+            return RecordReference.parse(str(given)).read()
+        case tuple():
+            acceleration, dt = np.asarray(given[0], np.float64), float(given[1])
+            digest = sha256(acceleration.tobytes()).hexdigest()
+            return Accelerogram("array", acceleration, dt, "array", "array", "m/s2", digest, {})
+        case _:
+            allowed = "it must be a reference such as kobe.csv@unit=g, or accelerations [m/s2] and their time step [s]"
+            raise InvalidInput("record", given, allowed)
 
 
 @contextmanager

@@ -10,7 +10,7 @@ from pydantic import ValidationError
 
 from bench.config.declared import Declared, at, declared, keys
 from bench.config.numbers import carries_unit, items_of, read_number, read_values, require_units_alike
-from sim.errors import InvalidInput
+from sim.errors import InvalidInput, as_text
 from sim.parameters import Parameters
 
 Path = tuple[str | int, ...]
@@ -117,7 +117,7 @@ def read_fields(model: type[Parameters], typed: Mapping[str, Any]) -> dict[str, 
 def _parsed(model: type[P], data: Mapping[str, Any]) -> P:
     # strict JSON validation: it accepts a list for a tuple and a word for a choice, but not "12" or true for a number
     present = _in_si(model, with_present_names(model, data))
-    return model.model_validate_json(dumps(present, default=str), strict=True)
+    return model.model_validate_json(dumps(present, default=as_text), strict=True)
 
 
 def _in_si(model: type[Parameters], data: Mapping[str, Any]) -> dict[str, Any]:

@@ -1,14 +1,16 @@
 """Meaningless input is refused with the name of what is wrong, and before anything is integrated."""
 
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from sim.ensemble import simulate_many
+from sim.errors import InvalidInput
 from sim.excitation import SampledRecord, SineProgram, Sweep
 from sim.kernel import rocking as kernel
-from sim.rocking import State, simulate
+from sim.rocking import Mode, State, Status, simulate
 from sim.specimen import Block, Frame, Specimen
 
 NAN, INF = float("nan"), float("inf")
@@ -43,7 +45,7 @@ def sine(amplitude: float, omega: float = 16.0, duration: float = 1.0) -> SinePr
         ("excitation", lambda: simulate(BLOCK, SineProgram([]))),
         ("excitation", lambda: simulate(BLOCK, sine(NAN))),
         ("duration", lambda: simulate(BLOCK, sine(1.0, duration=-1.0))),
-        ("omega", lambda: simulate(BLOCK, sine(1.0, omega=-16.0))),
+        (r"^omega of a sweep = -16\.0 ", lambda: simulate(BLOCK, sine(1.0, omega=-16.0))),
         ("sample_times", lambda: simulate(BLOCK, QUIET, sample_times=[0.5, 0.2])),
         ("sample_times", lambda: simulate(BLOCK, QUIET, sample_times=[0.5, NAN])),
         ("sample_times", lambda: simulate(BLOCK, QUIET, sample_times=[-0.5, 0.5])),
@@ -52,7 +54,10 @@ def sine(amplitude: float, omega: float = 16.0, duration: float = 1.0) -> SinePr
         ("tolerance", lambda: simulate(BLOCK, QUIET, tolerance=NAN)),
         ("overturning_angle", lambda: simulate(BLOCK, QUIET, overturning_angle=NAN)),
         ("peaks_from", lambda: simulate(BLOCK, QUIET, peaks_from=NAN)),
-        ("state", lambda: simulate(BLOCK, QUIET, state=State(omega=INF))),
+        (r"^omega = inf ", lambda: simulate(BLOCK, QUIET, state=State(omega=INF))),
+        (r"^v2 = nan ", lambda: simulate(BLOCK, QUIET, state=State(v2=NAN))),
+        (r"^theta = 0\.1 ", lambda: simulate(Specimen(), QUIET, state=State(theta=0.1))),
+        (r"^omega = -0\.2 ", lambda: simulate(Specimen(), QUIET, state=State(omega=-0.2))),
         ("theta", lambda: simulate(BLOCK, QUIET, state=State(theta=-1.6))),
         ("tolerance", lambda: simulate_many([BLOCK, BLOCK], QUIET, tolerance=0.0)),
         ("theta", lambda: simulate_many(BLOCK, QUIET, states=[State(), State(theta=2.0)])),
@@ -67,3 +72,22 @@ def test_refused_before_anything_is_integrated(
     with pytest.raises(ValueError, match=named):
         attempt()
     assert not integrated
+
+
+@pytest.mark.parametrize(
+    ("value", "shown"),
+    [
+        (np.float64(1.5), "1.5"),
+        (np.int64(-3), "-3"),
+        ((np.float64(1.5), 2), "(1.5, 2)"),
+        (["a", None, True], "['a', None, True]"),
+        (Mode.ROCK_A, "1"),
+        (Status.FAILED, "'failed'"),
+        (Path("a b.toml"), "'a b.toml'"),
+        ({"k1": 1.0}, "a table"),
+        (State(u1=0.2), "an object of type State"),
+        ([Specimen()], "[an object of type Specimen]"),
+    ],
+)
+def test_a_refused_value_is_shown_without_its_representation_in_python(value: object, shown: str) -> None:
+    assert str(InvalidInput("item", value, "no")) == f"item = {shown} is refused: no"

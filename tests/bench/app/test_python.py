@@ -24,6 +24,7 @@ from bench.app.predictions import SteadyPrediction
 from bench.app.session import SessionResult, run_session
 from bench.datafile.reader import open_datafile
 from bench.events import Acquired, Event, Subscriber
+from sim.rocking import State
 from sim.specimen import Block
 
 pytestmark = pytest.mark.usefixtures("shared_results")
@@ -136,6 +137,8 @@ def test_modes_are_those_of_equations_12_to_14() -> None:
         ({"omega": 16, "beta": 0.4, "record": "synthetic:kobe"}, "record", "not both"),
         ({"record": "synthetic:nowhere", "beta": 0.4}, "record", "pacoima"),
         ({"record": "synthetic:kobe", "beta": 0.4, "table_band": "3:1"}, "table_band", "ascend"),
+        ({"record": State(), "beta": 0.4}, "record", "kobe.csv@unit=g"),
+        ({"omega": State(), "beta": 0.4}, "omega[0]", "above 0"),
     ],
 )
 def test_a_prediction_names_item_and_remedy(arguments: dict[str, object], item: str, remedy: str) -> None:
@@ -143,6 +146,7 @@ def test_a_prediction_names_item_and_remedy(arguments: dict[str, object], item: 
         bench.predict(**arguments)  # type: ignore[call-overload]
     assert refused.value.item == item
     assert remedy in refused.value.allowed
+    assert "State(" not in str(refused.value)
 
 
 def test_samples_are_chosen_by_run_specimen_and_time(stored: Path) -> None:
