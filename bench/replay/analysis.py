@@ -35,6 +35,10 @@ class NotComparable(RockbenchError):
     error_code = "not_comparable"
 
 
+class DriveChanged(NotComparable):
+    """Error raised for settings that would have changed the drive of the table."""
+
+
 def follow(
     record: DataFile,
     prepared: Prepared[Any],
@@ -62,12 +66,12 @@ def carry_out(
 ) -> tuple[Replayed, tuple[Parameters, ...]]:
     """Carry out a plan with `changed` settings on the recorded samples. Returns the replay and its points.
 
-    `configuration` is the recorded one. Raises NotComparable if the plan with these settings would have driven the
+    `configuration` is the recorded one. Raises DriveChanged if the plan with these settings would have driven the
     table differently, because the recorded motion is not the response to that drive.
     """
     replayed = replay(record, changed.plan(), configuration, clock=VirtualClock(), subscribers=subscribers)
     if (why := replayed.first_difference(DRIVE)) is not None:
-        raise NotComparable(f"these settings would change the drive of the table ({why}): repeat the measurement")
+        raise DriveChanged(f"these settings would change the drive of the table ({why}): repeat the measurement")
     return replayed, replayed.points
 
 

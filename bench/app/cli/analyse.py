@@ -86,13 +86,13 @@ def analyse(
     `<name>.specimen.json` for other runs. Settings that would have changed the drive of the table are refused: the
     recorded samples cannot show their effect.
 
-    The exit code is 0 when the results were written, 1 when the recorded samples are insufficient, 2 when an input was
-    refused.
+    The exit code is 0 when the results were written, 1 when this version of the software does not reproduce the
+    recorded results, 2 when an input was refused.
     """
     progress("loading the program")
     from bench.app.cli.terminal import progress_on
     from bench.datafile.reader import open_datafile
-    from bench.replay.analysis import Analysis, NotComparable, write_analysis
+    from bench.replay.analysis import Analysis, DriveChanged, NotComparable, write_analysis
     from bench.replay.recording import former_keys
 
     if out is not None and out.exists():
@@ -112,7 +112,7 @@ def analyse(
                 result, replayed, points = _carried_out(record, choice, [display])
         except NotComparable as error:
             report_error(error)
-            return 1
+            return 2 if isinstance(error, DriveChanged) else 1
         except KeyboardInterrupt:
             report_interrupt("the analysis was interrupted; nothing was written")
             return 130

@@ -219,6 +219,6 @@ def test_another_protocol_is_carried_out_again_unless_it_would_have_driven_other
         assert verdicts.count("failed") == 1
         assert b"failed" not in analysis["entry/recorded_points/verdict"][:]
         assert json.loads(analysis["entry/process/settings"][()]) == {"latency": 0.001}
-    assert main(["analyse", file, "--set", "velocity=0.05"]) == 1
+    assert main(["analyse", file, "--set", "velocity=0.05"]) == 2
     assert "change the drive of the table (the drive first differs at sample" in capsys.readouterr().err
     assert not (tmp_path / "campaign.analysis-2.h5").exists()
