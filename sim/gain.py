@@ -120,9 +120,8 @@ def seismic_curve(
 ) -> list[SeismicGain]:
     """Gain coefficients under `record`, from rest, for each spring label of `betas`, computed on all processors.
 
-    The peaks are those during the record, without the free motion after it. Raises InvalidInput for a record under
-    which the bare frame does not move or does not remain finite, and pydantic's ValidationError for a negative label.
-    Source: Eq. (10).
+    The peaks are those during the record, without the free motion after it. Raises InvalidInput for a negative label,
+    and for a record under which the bare frame does not move or does not remain finite. Source: Eq. (10).
     """
     bare = simulate(specimen.bare(), record)
     if bare.status is not Status.COMPLETED or not min(bare.peaks.u1, bare.peaks.drift) > 0.0:

@@ -92,7 +92,7 @@ def gain_map(
 
     The base acceleration is `amplitude` [m/s2] sin(omega t); in the test without the block, its amplitude is
     `bare_amplitude`, if different. `scheduler` and `done` are those of `sim.sweep.sweep`. Raises InvalidInput for an
-    empty axis or a frequency or amplitude outside its range, and pydantic's ValidationError for a negative stiffness.
+    empty axis, or a stiffness, frequency or amplitude outside its range.
     """
     rows, row_of = np.unique(np.asarray(betas, dtype=np.float64), return_inverse=True)
     columns, column_of = np.unique(np.asarray(omegas, dtype=np.float64), return_inverse=True)

@@ -4,7 +4,7 @@ The symbols are those of the paper (Tables 1 to 3), and the values in the paper 
 """
 
 from functools import cached_property
-from math import hypot, isclose, sqrt
+from math import hypot, inf, isclose, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -203,7 +203,11 @@ class Specimen(Parameters):
     def coupled(self, label: float) -> "Specimen":
         """Return the specimen with the spring labelled `label`, with its stiffness as measured or, if not measured, its
         nominal stiffness.
+
+        Raises InvalidInput for a label that is negative or not finite.
         """
+        if not 0.0 <= label < inf:
+            raise InvalidInput("beta", label, "the label of a spring, k_C/k1, must be finite and 0 or more")
         measured = next((each.k_c for each in self.springs if isclose(each.label, label)), None)
         if measured is not None:
             return self.with_spring(measured, label)
@@ -212,7 +216,11 @@ class Specimen(Parameters):
     def with_spring(self, k_c: float, label: float | None = None) -> "Specimen":
         """Return the specimen with a spring of stiffness `k_c` [N/m], labelled `label` or, by default, by its stiffness
         ratio.
+
+        Raises InvalidInput for a stiffness that is negative or not finite.
         """
+        if not 0.0 <= k_c < inf:
+            raise InvalidInput("k_c", k_c, "the stiffness of a spring [N/m] must be finite and 0 or more")
         nominal = k_c / (self.spring_k1 or self.frame.k1)
         return self._mounted(k_c / self.frame.k1, nominal if label is None else label)
 

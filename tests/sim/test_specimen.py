@@ -73,5 +73,17 @@ def test_negative_coupling_is_refused() -> None:
         Specimen(beta=-0.1)
 
 
+@pytest.mark.parametrize("specimen", [Specimen(), Specimen(spring_k1=200.0)])
+@pytest.mark.parametrize("label", [-0.4, float("nan"), float("inf")])
+def test_a_label_without_meaning_is_refused_with_its_value(specimen: Specimen, label: float) -> None:
+    with pytest.raises(InvalidInput, match=f"^beta = {label} is refused: the label of a spring"):
+        specimen.coupled(label)
+
+
+def test_a_negative_stiffness_of_a_spring_is_refused_with_its_value() -> None:
+    with pytest.raises(InvalidInput, match=r"^k_c = -80\.0 is refused"):
+        Specimen().with_spring(-80.0)
+
+
 def test_refusals_are_one_family() -> None:
     assert issubclass(InvalidInput, ValueError)
