@@ -89,21 +89,20 @@ class StabilityPlan:
         for place, planned in self._starts.items():
             point = yield from self._point(place, planned, calibration)
             yield from self._finished(point)
-            self._pace.finished(place.omega)
-        if p.bisect:
-            yield from self._bisect(calibration)
+        yield from self._bisect(calibration)
         return self.points
 
     def _finished(self, point: StabilityPoint) -> Generator[Step, Outcome, None]:
         self.points.append(point)
+        self._pace.finished(point.omega_rad_s)
+        following = self._following()
+        if following is not None:
+            self._pace.add(following.omega)
         yield Publish(self._pace.progress(f"{_text(point.omega_rad_s, point.amplitude_factor)} finished"))
         yield Publish(PointFinished(point))
 
     def _bisect(self, calibration: DriveCalibration) -> Generator[Step, Outcome, None]:
-        for _ in range(MOST_BISECTIONS):
-            middle = self.next_middle()
-            if middle is None:
-                return
+        while (middle := self._following()) is not None:
             planned, others = self._nearest(middle)
             amplitude = middle.factor * self._specimen.uplift_acceleration
             starts = [
@@ -117,8 +116,14 @@ class StabilityPlan:
             )
             point = yield from self._point(middle, starts, calibration)
             yield from self._finished(point.model_copy(update={"bisected": True}))
-            if point.modulus is None:
-                return
+
+    def _following(self) -> Place | None:
+        """Next point of the bisection; None before all planned points are finished and after the last one."""
+        bisected = self.points[len(self._starts) :]
+        ended = len(bisected) == MOST_BISECTIONS or any(each.modulus is None for each in bisected)
+        if not self._parameters.bisect or len(self.points) < len(self._starts) or ended:
+            return None
+        return self.next_middle()
 
     def next_middle(self) -> Place | None:
         """Middle of the widest bracket of a boundary; None if no bracket is wider than the parameter `bracket`."""

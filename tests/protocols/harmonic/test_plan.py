@@ -124,10 +124,13 @@ def test_a_drive_is_never_followed_before_it_was_armed_and_calibrated(peaks: tup
             assert not armed
 
 
-def test_progress_goes_to_the_end_and_never_back(peaks: tuple[float, float, float]) -> None:
+@pytest.mark.parametrize("falls", [0, 1])
+def test_progress_goes_to_the_end_and_never_back(peaks: tuple[float, float, float], falls: int) -> None:
     bare, drift, u1 = peaks
-    script = Script(lambda _, k: cycle(k, drift, u1), bare)
+    # a block that falls late takes the progress of its start with it
+    script = Script(lambda start, k: None if start <= falls and k >= 20 else cycle(k, drift, u1), bare)
     script.run()
+    assert script.start == 1 + falls
     fractions = [
         step.event.fraction for step in script.steps if isinstance(step, Publish) and isinstance(step.event, Progress)
     ]

@@ -1,11 +1,17 @@
 """Boundaries from points and curves, predicted multipliers, and the deflection before a release."""
 
+from collections.abc import Generator
+
 import numpy as np
 import pytest
 from pydantic import ValidationError
 
 from bench.config.model import BenchConfiguration
 from bench.config.sections import Acquisition
+from bench.control.oscillator import Segment
+from bench.control.starts import Start
+from bench.engine.steps import Done, Dwell, Measured, Outcome, Publish, Step
+from bench.events import Progress
 from protocols.common.sine.holding import prepared
 from protocols.stability.experiment import StabilityTest
 from protocols.stability.plan import Place, StabilityPlan
@@ -18,6 +24,7 @@ from sim.errors import InvalidInput
 from sim.knowledge import SpecimenKnowledge
 from sim.specimen import Specimen
 from sim.steady import Orbit
+from tests.protocols.harmonic.scripted import cycle
 
 AMPLITUDE = 1.01 * Specimen().uplift_acceleration
 
@@ -130,6 +137,39 @@ def test_the_bisection_takes_the_middle_of_the_widest_bracket() -> None:
     assert plan.next_middle() == Place(pytest.approx(15.4), 1.01)
     plan.points.extend((point(15.25, 1.001), point(15.1, 0.999)))
     assert plan.next_middle() is None
+
+
+class _Measured(StabilityPlan):
+    """A plan whose points have a given modulus at each frequency, without their steps."""
+
+    def _point(self, place: Place, *_: object) -> Generator[Step, Outcome, StabilityPoint]:
+        yield Publish(self._pace.progress("measuring", place.omega, 100))
+        yield Publish(self._pace.progress("measuring after a fall", place.omega, 10))
+        return point(place.omega, 1.0 + 0.1 * (place.omega - 15.33))
+
+
+def test_progress_through_a_bisection_never_goes_back_and_ends_with_its_last_point() -> None:
+    parameters = StabilityParameters(omega=(15.0, 16.0), bracket=0.01)
+    places = [Place(omega, 1.01) for omega in parameters.omega]
+    start = Start("direct", (Segment(8.0, AMPLITUDE, 15.0),), 0.5)
+    plan = _Measured(parameters, BenchConfiguration(), dict.fromkeys(places, (start,)))
+    steps, said = plan.steps(), list[Progress]()
+    step: Step | None = next(steps)
+    while step is not None:
+        if isinstance(step, Publish) and isinstance(step.event, Progress):
+            said.append(step.event)
+        made = Measured(tuple(cycle(k, 0.001) for k in range(step.cycles))) if isinstance(step, Dwell) else Done()
+        try:
+            step = steps.send(made)
+        except StopIteration:
+            step = None
+    assert len(plan.points) > 3
+    fractions = [each.fraction for each in said]
+    assert fractions == sorted(fractions)
+    assert fractions[-1] == 1.0
+    assert max(fractions[:-1]) < 1.0
+    assert all(each.remaining > 0.0 for each in said[:-1])
+    assert said[-1].remaining == 0.0
 
 
 def test_a_design_exists_for_stable_orbits_too() -> None:
