@@ -105,15 +105,20 @@ class LoopCheck(Prepared[CheckParameters]):
         }
 
     def plan(self) -> Plan:
-        return self.collected(_steps(self.parameters, self.configuration))
+        found = yield from self.collected(_steps(self.parameters, self.configuration))
+        return self._result(found.points, complete=True)
 
     def result(self, points: Sequence[Parameters]) -> Result:
+        return self._result(points, complete=False)
+
+    def _result(self, points: Sequence[Parameters], *, complete: bool) -> Result:
+        """Result of a complete or interrupted check; an interrupted one has not passed, since lines are missing."""
         lines = [point for point in points if isinstance(point, CheckLine)]
         return Result(
             points=tuple(points),
-            text=_table(lines),
+            text=_table(lines, complete=complete),
             figures={"margins.png": lambda path: write_figure(path, _margins(lines))},
-            passed=all(line.verdict is not Verdict.FAILED for line in lines),
+            passed=complete and all(line.verdict is not Verdict.FAILED for line in lines),
         )
 
 
@@ -222,7 +227,7 @@ _COLUMNS = (
 )
 
 
-def _table(lines: Sequence[CheckLine]) -> str:
+def _table(lines: Sequence[CheckLine], *, complete: bool) -> str:
     """Text table of the lines, each followed by its remedy, if any, and the number of lines by verdict."""
     title, rule, *rows = text_table(_COLUMNS, map(_cells, lines)).splitlines()
     text = [title, rule]
@@ -232,7 +237,8 @@ def _table(lines: Sequence[CheckLine]) -> str:
             text += textwrap.wrap(line.remedy, WIDTH, initial_indent="    -> ", subsequent_indent="       ")
     counted = [sum(line.verdict is verdict for line in lines) for verdict in Verdict]
     summary = ", ".join(f"{number} {verdict}" for number, verdict in zip(counted, Verdict, strict=True) if number)
-    return "\n".join([*text, "", f"{summary or 'nothing was checked'}."])
+    incomplete = "" if complete else " The check was not completed: further lines are missing."
+    return "\n".join([*text, "", f"{summary or 'nothing was checked'}.{incomplete}"])
 
 
 def _margins(lines: Sequence[CheckLine]) -> "Figure":

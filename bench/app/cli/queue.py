@@ -140,7 +140,9 @@ def _run_one(
         else:
             good = ended.status in GOOD and ended.passed
             outcome = (
-                f"{ended.status}: {ended.reason}" if ended.passed else f"{ended.status}, but at least one check failed"
+                f"{ended.status}, but at least one check failed"
+                if ended.status == "completed" and not ended.passed
+                else f"{ended.status}: {ended.reason}"
             )
             if ended.status == "completed" and good:
                 return None

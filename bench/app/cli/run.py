@@ -270,4 +270,7 @@ def _error(result: "SessionResult") -> tuple[str | None, Code]:
     """The error of a run for its JSON object, None if the run ended well, and the code of the error."""
     if result.status not in GOOD:
         return result.reason, "run_failed" if result.status == "failed" else "run_aborted"
-    return None if result.passed else "at least one check failed: see the points", "check_failed"
+    if result.passed:
+        return None, "check_failed"
+    completed = result.status == "completed"
+    return "at least one check failed: see the points" if completed else "the check was not completed", "check_failed"

@@ -192,14 +192,13 @@ class QueueRunner(QObject):
         self._begun = None
         if begun[1].test.out is None:
             remove_unused(begun[0].out)
-        passed = True
         if isinstance(ended, Refused):
             status, good, outcome = ("failed" if ended.failed else "refused"), False, ended.text
+            stated = status
         else:
-            passed = ended.passed
-            status, good = ended.status, passed and ended.status in GOOD
-            outcome = ended.reason if passed else "not passed"
-        stated = status if passed else "not passed"
+            status, good = ended.status, ended.passed and ended.status in GOOD
+            not_passed = ended.status == "completed" and not ended.passed
+            outcome, stated = ("not passed", "not passed") if not_passed else (ended.reason, status)
         why = "" if stated == "completed" and good else texts.QUEUE_ENDED.format(number=index + 1, status=stated)
         self._finish_test(index, good=good, outcome=f"{status}: {outcome}", why=why)
 

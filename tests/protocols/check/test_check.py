@@ -8,12 +8,16 @@ from typing import Any
 
 import pytest
 
+import bench
 import bench.app.session
+from bench.analysis.check_line import passed
 from bench.app.cli.main import main
 from bench.config.model import BenchConfiguration
 from bench.datafile.reader import open_datafile
 from bench.rigs import open_rig
 from drivers.rig import Channel, Rig
+from protocols.check.experiment import LoopCheck
+from protocols.check.protocol import CheckParameters
 
 SHORT = ("--cycles", "4", "--rest", "1")
 LONG_BLOCKS = "[acquisition]\nblock_duration = 0.2\n"
@@ -181,5 +185,19 @@ def test_the_text_names_the_remedy_below_a_failed_line(tmp_path: Path, capsys: p
     at = next(number for number, line in enumerate(lines) if line.startswith("FAILED"))
     assert "laser_2" in lines[at]
     assert "-> beyond the" in lines[at + 1]
-    assert "6 passed, 1 failed, 1 untested." in captured.out
+    assert "6 passed, 1 failed, 1 untested.\n" in captured.out
     assert "FAILED: laser_2, valid samples at rest" in captured.err
+
+
+def test_an_interrupted_check_is_not_completed_and_not_passed(tmp_path: Path) -> None:
+    """The operator does not clamp the storeys: nothing is measured, and nothing may be called passed."""
+    with bench.run("check", operator=lambda _: False, out=tmp_path / "out") as campaign:
+        assert campaign.status != "completed"
+    assert json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))["passed"] is False
+
+
+def test_counts_of_an_interrupted_check_are_marked_as_incomplete() -> None:
+    check = LoopCheck(CheckParameters(), BenchConfiguration())
+    result = check.result([passed("table_acceleration", "noise at rest")] * 2)
+    assert result.text.endswith("\n2 passed. The check was not completed: further lines are missing.")
+    assert result.passed is False
