@@ -55,7 +55,11 @@ TABLE = {
 }
 
 LASERS = {
-    name: Sensor(signal, f"hardware.{name}.polarity", f"hardware.{name}.measuring_range and hardware.lasers.load")
+    name: Sensor(
+        signal,
+        f"hardware.{name}.polarity",
+        f"hardware.{name}.measuring_range (on the analogue output also hardware.lasers.load)",
+    )
     for name, signal in zip(STOREYS, ("storey_1", "storey_2"), strict=True)
 }
 
@@ -66,6 +70,18 @@ _SIGN = "reverse the sign of {}, or the sensor: its signal is opposite to {}"
 _SCALE = "check {} and the calibration: the scale differs from that of {}"
 
 _OWN_LATENCY = "the laser's internal latency is too long: raise its measuring rate, and disable its averaging"
+
+_AHEAD = (
+    "the laser is ahead of the table's sensor, whose input is late: check the input delays, which the report lists "
+    "with the bench"
+)
+
+_UNEQUAL = "the lasers differ in delay: set both to the same rate, averaging and output, then repeat the check"
+
+_TABLE_FIRST = (
+    "the table's sensors differ in delay, so that the laser's delay is unknown: correct the delay of "
+    f"{TABLE_ACCELERATION} against {TABLE_DISPLACEMENT}, then repeat the check"
+)
 
 _SKEW = (
     "the two sensors show the same motion at different times: connect both to inputs of one module, or "
@@ -84,7 +100,6 @@ def table_delay_lines(
     """
     if parameters.delay_tolerance is None:
         return
-    lowest, highest = -parameters.delay_tolerance, parameters.delay_tolerance + 0.5 / sample_rate
     pair = _delay_between(sines.omega, sines.displacement, sines.accelerometer)
     storeys = dict(zip(STOREYS, (sines.storey_1, sines.storey_2), strict=True)) if lasers else {}
     against = {name: _delay_between(sines.omega, sines.accelerometer, seen) for name, seen in storeys.items()}
@@ -96,7 +111,7 @@ def table_delay_lines(
         TABLE_ACCELERATION,
         f"delay against {TABLE_DISPLACEMENT}",
         pair.delay,
-        (lowest, highest),
+        _allowed_of_table(parameters.delay_tolerance, sample_rate),
         "s",
         f"{odd}{_SKEW}",
         expected=0.0,
@@ -110,6 +125,11 @@ def table_delay_lines(
         allowed = -most - 0.5 / sample_rate, most
         remedy = "compare the other delay lines, which show whether the accelerometer or this laser differs"
         yield judged(name, what, one.delay, allowed, "s", remedy, expected=0.0, uncertainty=expanded)
+
+
+def _allowed_of_table(tolerance: float, sample_rate: float) -> tuple[float, float]:
+    """Limits [s] of the delay of the accelerometer against the table's displacement sensor."""
+    return -tolerance, tolerance + 0.5 / sample_rate
 
 
 def _delay_between(omega: NDArray[np.float64], first: Amplitudes, second: Amplitudes) -> CommonMotion:
@@ -156,18 +176,25 @@ def scale_lines(sines: Sines, parameters: CheckParameters, *, lasers: bool) -> I
 
 def delay_lines(sines: Sines, parameters: CheckParameters, configuration: BenchConfiguration) -> Iterator[CheckLine]:
     """Lines for the delay of each laser and for the difference of the delays; for serial lasers of a real bench, also
-    the value of the setting that compensates the mean delay.
+    the value of the setting that compensates the mean delay, unless the table's sensors contradict each other.
 
     A delay is positive if the laser lags behind the table's displacement.
     """
+    omega = sines.omega
     most = allowed_delay(configuration.known_specimen, parameters.highest_omega, parameters.u1_error)
     hardware = configuration.hardware.lasers
     settable = configuration.backend == "hardware" and hardware.connection == "serial"
-    found: list[tuple[float, float]] = []
-    for name, amplitudes in zip(STOREYS, (sines.storey_1, sines.storey_2), strict=True):
-        motion = _delay_between(sines.omega, sines.displacement, amplitudes)
-        found.append((motion.delay, motion.uncertainty))
-        remedy = "set hardware.lasers.delay to the value in the last line" if settable else _OWN_LATENCY
+    found = [_delay_between(omega, sines.displacement, seen) for seen in (sines.storey_1, sines.storey_2)]
+    difference, between = found[1].delay - found[0].delay, COVERAGE * configuration.analysis.laser_timing
+    differs = _table_differs(sines, parameters, configuration.sample_rate)
+    for name, motion in zip(STOREYS, found, strict=True):
+        if differs:
+            remedy = _TABLE_FIRST
+        elif settable:
+            unequal = abs(difference) > between
+            remedy = _UNEQUAL if unequal else "set hardware.lasers.delay to the value in the last line"
+        else:
+            remedy = _OWN_LATENCY if motion.delay > 0.0 else _AHEAD
         yield judged(
             name,
             "delay against table_displacement",
@@ -178,21 +205,28 @@ def delay_lines(sines: Sines, parameters: CheckParameters, configuration: BenchC
             expected=0.0,
             uncertainty=COVERAGE * motion.uncertainty,
         )
-    (first, u_1), (second, u_2) = found
-    between = COVERAGE * configuration.analysis.laser_timing
+    expanded = COVERAGE * float(np.hypot(found[0].uncertainty, found[1].uncertainty))
     yield judged(
         "lasers",
         f"delay of {STOREYS[1]} against {STOREYS[0]}",
-        second - first,
+        difference,
         (-between, between),
         "s",
         "set both lasers to the same rate, averaging and output; check that neither of them loses values",
         expected=0.0,
-        uncertainty=COVERAGE * float(np.hypot(u_1, u_2)),
+        uncertainty=expanded,
     )
-    if settable:
-        value, expanded = hardware.delay - 0.5 * (first + second), 0.5 * COVERAGE * float(np.hypot(u_1, u_2))
-        yield stated("lasers", "correct value of hardware.lasers.delay", value, "s", uncertainty=expanded)
+    if settable and not differs:
+        value = hardware.delay - 0.5 * (found[0].delay + found[1].delay)
+        yield stated("lasers", "correct value of hardware.lasers.delay", value, "s", uncertainty=0.5 * expanded)
+
+
+def _table_differs(sines: Sines, parameters: CheckParameters, sample_rate: float) -> bool:
+    """Whether the table's sensors differ in delay; False if their delays are not compared."""
+    if parameters.delay_tolerance is None:
+        return False
+    lowest, highest = _allowed_of_table(parameters.delay_tolerance, sample_rate)
+    return not lowest <= _delay_between(sines.omega, sines.displacement, sines.accelerometer).delay <= highest
 
 
 def signed_scale(omega: NDArray[np.float64], amplitudes: Amplitudes, reference: Amplitudes) -> tuple[float, float]:

@@ -162,7 +162,7 @@ def _noise(channel: Channel, counts: Counts, limit: float | None) -> CheckLine:
     if limit is None and noise >= least:
         return stated(channel.name, "noise at rest", noise, channel.unit)
     if noise < least:
-        remedy = "the reading is constant: check connection and power of the sensor, and the terminal"
+        remedy = "the reading is constant: check connection and power of the sensor, and its terminal or port"
     else:
         remedy = "let the bench come to rest, then check cable, shield and ground, and the sensor's target"
     allowed = least, np.inf if limit is None else limit

@@ -139,6 +139,39 @@ def test_lasers_that_differ_in_delay_fail_on_their_difference() -> None:
     assert failures(lines) == [("lasers", "delay of laser_2 against laser_1")]
 
 
+ANALOGUE = BenchConfiguration(backend="hardware", hardware=Hardware(lasers=Lasers(connection="analogue")))
+
+
+@pytest.mark.parametrize(
+    ("configuration", "delays", "remedies"),
+    [
+        (SERIAL, (2e-3, 2e-3), ("set hardware.lasers.delay", "set hardware.lasers.delay")),
+        (SERIAL, (-2e-3, -2e-3), ("set hardware.lasers.delay", "set hardware.lasers.delay")),
+        # the mean of both would leave one ahead and one behind
+        (SERIAL, (0.0, 6e-3), ("", "the lasers differ in delay")),
+        (ANALOGUE, (2e-3, -2e-3), ("internal latency is too long", "the laser is ahead of the table's sensor")),
+    ],
+)
+def test_the_remedy_for_the_delay_of_a_laser_fits_its_cause(
+    configuration: BenchConfiguration, delays: tuple[float, float], remedies: tuple[str, str]
+) -> None:
+    x = sines().displacement
+    made = sines(storey_1=late(x, delays[0]), storey_2=late(x, delays[1]))
+    for line, remedy in zip(delay_lines(made, PARAMETERS, configuration), remedies, strict=False):
+        assert remedy in line.remedy
+        assert bool(remedy) is (line.verdict is Verdict.FAILED)
+
+
+@pytest.mark.parametrize("configuration", [SERIAL, ANALOGUE])
+def test_a_late_sensor_of_the_table_is_not_blamed_on_the_lasers(configuration: BenchConfiguration) -> None:
+    """A table sensor behind a filter of 20 ms: a delay of the lasers set against it would make their values wrong."""
+    lines = list(delay_lines(sines(displacement=late(sines().displacement, 0.02)), PARAMETERS, configuration))
+    assert failures(lines) == [(f"laser_{k}", "delay against table_displacement") for k in (1, 2)]
+    for line in lines[:2]:
+        assert "the table's sensors differ in delay" in line.remedy
+    assert len(lines) == 3
+
+
 def test_the_allowed_delay_of_a_single_mass_is_its_closed_form() -> None:
     """A second storey tied rigidly to the first: u1 = x r^2 / (1 - r^2), so |u1 + x| / |u1| = 1 / r^2."""
     frame = Frame(k2=1e9, xi1=0.0, xi2=0.0)
