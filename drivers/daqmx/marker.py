@@ -1,4 +1,4 @@
-"""Counter output that switches the lasers off at known times of the sample clock."""
+"""Counter output that switches the lasers off at known times of the DAQ device's timebase."""
 
 from nidaqmx.constants import AcquisitionType
 
@@ -12,7 +12,8 @@ NAME = "rockbench_marker"
 
 
 class Marker:
-    """Train of `pulses` of the counter `daq.laser_marker`. It begins when the sample clock of a run starts.
+    """Trains of pulses of the counter `daq.laser_marker`: `pulses` begin when the sample clock of a run starts; other
+    trains run free between the runs.
 
     The lasers are on while the output is low. The counters and the sample clock of a device share one timebase.
     """
@@ -24,17 +25,12 @@ class Marker:
 
     def prepare(self, trigger: str) -> None:
         """Create the task, which starts on `trigger`; until then its output is low."""
-        self.clear()
-        if self.counter is None:
-            return
-        pulses = self._pulses
-        with translated(f"preparing the pulses of {self.counter}"):
-            self._task = task = library.task(NAME, self._connection.options(NAME))
-            task.co_channels.add_co_pulse_chan_time(
-                self.counter, initial_delay=pulses.delay, low_time=pulses.low, high_time=pulses.high
-            )
-            task.timing.cfg_implicit_timing(sample_mode=AcquisitionType.FINITE, samps_per_chan=pulses.number)
-            task.triggers.start_trigger.cfg_dig_edge_start_trig(trigger)
+        self._create(self._pulses, trigger)
+
+    def run_free(self, pulses: Pulses) -> None:
+        """Output `pulses` from now on, until `prepare` or `clear`."""
+        self._create(pulses, None)
+        self.arm()
 
     def arm(self) -> None:
         """Arm the task on its trigger."""
@@ -48,6 +44,19 @@ class Marker:
         if task is not None:
             with translated("clearing the pulse task"):
                 task.close()
+
+    def _create(self, pulses: Pulses, trigger: str | None) -> None:
+        self.clear()
+        if self.counter is None:
+            return
+        with translated(f"preparing the pulses of {self.counter}"):
+            self._task = task = library.task(NAME, self._connection.options(NAME))
+            task.co_channels.add_co_pulse_chan_time(
+                self.counter, initial_delay=pulses.delay, low_time=pulses.low, high_time=pulses.high
+            )
+            task.timing.cfg_implicit_timing(sample_mode=AcquisitionType.FINITE, samps_per_chan=pulses.number)
+            if trigger is not None:
+                task.triggers.start_trigger.cfg_dig_edge_start_trig(trigger)
 
 
 def _counter(connection: Connection, daq: Daq) -> str | None:

@@ -111,6 +111,16 @@ class DaqSession:
         """Identity and settings of the device, for the data file."""
         return dict(self._description)
 
+    def output_pulses(self, pulses: Pulses) -> None:
+        """Output `pulses` at `daq.laser_marker`, beginning now, until `prepare`; without a counter, do nothing. Raises
+        RigError, also during a run.
+        """
+        with self._lock:
+            self._require(_State.IDLE, "output of pulses")
+            if self._tasks.marker is not None:
+                with self._resting_on_failure():
+                    self._tasks.marker.run_free(pulses)
+
     def prepare(self) -> None:
         """Set the output to 0 V, prepare it to start on the inputs' trigger, close the enable relay, and wait for the
         amplifier. The sample clock is started later, by `start`.

@@ -76,6 +76,8 @@ class Tasks:
             _require_rate("inputs", self.inputs.rate, sample_rate)
             _require_rate("output", self.output.rate, sample_rate)
             self.marker = None if pulses is None else Marker(connection, daq, pulses)
+            if self.marker is not None:
+                made.callback(_quietly, self.marker.clear)
             self._made = made.pop_all()
 
     def prepare(self, is_cut: Callable[[], bool]) -> None:

@@ -1,7 +1,7 @@
 """The laboratory rig: DAQ and lasers, with the values of free-running sensors resampled to the DAQ's sample clock."""
 
 from collections.abc import Generator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import replace
 from math import ceil
 
@@ -24,7 +24,7 @@ from drivers.hardware.parameters import Hardware
 from drivers.hardware.tracks import Tracks, open_serial_lasers
 from drivers.rig import Alignment, Block, Channel, Counts, OperatorTask, RawValues
 from drivers.timebase.deskew import Deskew
-from drivers.timebase.marking import GOLDEN, Pulses, golden_pulses
+from drivers.timebase.marking import GOLDEN, Pulses, golden_pulses, observation_pulses
 
 _SETTLING = 0.05
 """Shortest time between the end of the pulses and the first sample of a run [s]."""
@@ -79,6 +79,9 @@ class HardwareRig(RigBase):
             if self._tracks is not None and hardware.daq.server is not None:
                 self._watch = ClockWatch(hardware.daq, INPUT_TASK, hardware.sample_rate)
                 opened.callback(self._watch.close)
+            self._between = None if self._pulses is None else observation_pulses(hardware.lasers.rate)
+            if self._between is not None:
+                self._daq.output_pulses(self._between)
             self._started = 0.0
             self.channels = analogue if self._tracks is None else (*analogue, *self._tracks.channels)
             self._opened = opened.pop_all()
@@ -110,7 +113,7 @@ class HardwareRig(RigBase):
     def arm(self) -> None:
         self.require_stopped("arm", REARM)
         if self._tracks is not None:
-            self._tracks.begin(self.sample_rate, self.clock)
+            self._tracks.begin(self.sample_rate, self.clock, self._between)
         with self._ending_on_failure():
             self._daq.prepare()
             if self.skipped:
@@ -138,11 +141,12 @@ class HardwareRig(RigBase):
         return Block(self._drive.advance(n), counts)
 
     def stop(self) -> None:
-        if self._state is RigState.CLOSED:
-            return
-        self._state = RigState.STOPPED
-        with self._raised_once():
-            self._daq.stop()
+        was_stopped = self._state in (RigState.STOPPED, RigState.CLOSED)
+        self._rest()
+        if self._between is not None and not was_stopped:
+            # the next run needs them, but can do without
+            with suppress(RigError):
+                self._daq.output_pulses(self._between)
 
     def halt(self) -> None:
         if self._state is RigState.CLOSED:
@@ -150,7 +154,7 @@ class HardwareRig(RigBase):
         try:
             self._daq.cut()
         finally:
-            self.stop()
+            self._rest()
 
     def close(self) -> None:
         if self._state is RigState.CLOSED:
@@ -164,6 +168,13 @@ class HardwareRig(RigBase):
         # on a real bench the operator has carried out the task; an emulated laboratory must change its virtual specimen
         if self._laboratory is not None:
             ask(self._laboratory, "handwork", work=work.value, amount=amount)
+
+    def _rest(self) -> None:
+        if self._state is RigState.CLOSED:
+            return
+        self._state = RigState.STOPPED
+        with self._raised_once():
+            self._daq.stop()
 
     def _start(self) -> None:
         self._daq.start()

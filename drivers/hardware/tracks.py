@@ -119,13 +119,16 @@ class Tracks:
         self._raw: list[list[Readings]] = [[] for _ in self._tracks]
         self.channels: tuple[Channel, ...] = tuple(track.channel for track in self._tracks)
 
-    def begin(self, sample_rate: float, clock: Clock) -> None:
+    def begin(self, sample_rate: float, clock: Clock, pulses: Pulses | None = None) -> None:
         """Begin a run with a new sample clock; the history of the sensors' clocks is kept. Before the first run, waits
-        until these clocks have been observed for the longest `observation_time`.
+        until these clocks have been observed for the longest `observation_time`. `pulses` are those that have switched
+        the sensors' beams off since the last run, if any.
         """
         clock.wait_until(self._known_from)
         self._take()
         for track, raw in zip(self._tracks, self._raw, strict=True):
+            if pulses is not None:
+                track.placing.observe_pulses(pulses.spacing)
             track.placing.begin()
             raw.clear()
         self._armed = now()

@@ -1,104 +1,27 @@
 """Values of a sensor with a free-running clock, interpolated to the sample clock."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drivers.rig import Alignment
 from drivers.timebase.clocks import SampleClock, SensorClock
-from drivers.timebase.marking import Mark, Pulses, marked_point
+from drivers.timebase.course import Course, Line
+from drivers.timebase.marking import Mark, Pulses, Rate, marked_point, pulse_rate
 from drivers.timebase.resampling import Marks, Plausibility, Resampler
-
-
-@dataclass(frozen=True)
-class Line:
-    """Linear relation of two clocks: `time` [s] on the first is `seconds` [s] on the second, which advances by `rate`
-    per second of the first.
-
-    The point (`time`, `seconds`) is close to the present, to avoid rounding errors on clocks that have run for weeks.
-    """
-
-    time: float
-    seconds: float
-    rate: float
-
-    def seconds_at(self, time: float) -> float:
-        """Time on the second clock at `time` on the first [s]."""
-        return self.seconds + self.rate * (time - self.time)
-
-    def time_at(self, seconds: float) -> float:
-        """Time on the first clock at `seconds` on the second [s]."""
-        return self.time + (seconds - self.seconds) / self.rate
-
-
-_SLEW = 50e-6
-"""Largest slew rate of the clock relation [s/s]: if the target moves at 1 m/s, its position error changes by at most
-50 um per second.
-"""
-_FIRST_SLEW = 500e-6
-"""Largest slew rate in the first phase of a run [s/s], when the clock relation is only known to a fraction of a
-millisecond.
-"""
-_FIRST = 10.0
-"""Duration of the first phase of a run [s]."""
-
-
-class Course:
-    """Time on the sensor's clock as a function of the sample clock: continuous, and linear within each block."""
-
-    def __init__(self) -> None:
-        self._began = self._seconds = self._time = np.nan
-
-    @property
-    def time(self) -> float:
-        """Time on the sensor's clock at the last requested sample [s]; NaN before the first request."""
-        return self._time
-
-    def times(self, line: Line, seconds: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Sensor times [s], shape (n,), at ascending `seconds` of the sample clock, following the present `line`; the
-        next request continues from the last one.
-        """
-        end = float(seconds[-1])
-        if not self._seconds < float(seconds[0]):
-            # the first request, and a request for an earlier time, do not continue a previous one
-            self._began = self._seconds = float(seconds[0])
-            self._time = line.time_at(self._seconds)
-        passed = end - self._seconds
-        final = self._after(line, passed)
-        rate = (final - self._time) / passed if passed > 0.0 else 1.0 / line.rate
-        times = self._time + rate * (seconds - self._seconds)
-        self._seconds, self._time = end, final
-        return times
-
-    def reach(self, line: Line, time: float) -> float:
-        """Latest time on the sample clock [s] for which `times` would return at most `time` [s]."""
-        known = line.seconds_at(time)
-        if np.isnan(self._seconds):
-            return known
-        ahead = time - self._time
-        if ahead < 0.0:
-            return self._seconds + ahead * line.rate
-        early = self._seconds + ahead / (1.0 / line.rate + self._slew)
-        late = self._seconds + ahead / (1.0 / line.rate - self._slew)
-        return min(max(known, early), late)
-
-    def _after(self, line: Line, passed: float) -> float:
-        """Sensor time [s] after a further `passed` [s]: on the line, or as close to it as the slew limit allows."""
-        free = self._time + passed / line.rate
-        allowed = self._slew * passed
-        return min(max(line.time_at(self._seconds + passed), free - allowed), free + allowed)
-
-    @property
-    def _slew(self) -> float:
-        return _FIRST_SLEW if self._seconds - self._began < _FIRST else _SLEW
-
 
 _KEPT = 10.0
 """Duration held by the buffer of values [s]."""
 _LEAST_HISTORY = 1.0
 """Shortest history of the sensor's clock with which its values are aligned to the sample clock [s]."""
+_FIRST_SPREAD = 40e-6
+"""Standard uncertainty of the rate from the arrivals in the first second of a run, on a busy computer [1]."""
+_SETTLED = 60.0
+"""Time after the pulses at the beginning of a run up to which the lateness of the arrivals is estimated again [s]: half
+the history of the clocks.
+"""
 _BACK = 0.25
 """Backward step of the sensor's time [s] above which a value is not a repetition but follows a restart of the sensor's
 clock.
@@ -131,6 +54,9 @@ class SensorTrack:
         self._sensor = SensorClock()
         self._course = Course()
         self._mark: Mark | None = None
+        self._observed: tuple[Rate, float] | None = None
+        self._marked_until = -np.inf
+        self._lateness = 0.0
         self._values = self._lost = self._late = 0
         self._asked = 0.0
 
@@ -163,6 +89,19 @@ class SensorTrack:
             return -np.inf
         return self._course.reach(line, last[1])
 
+    def observe_pulses(self, spacing: float) -> None:
+        """Measure the rate of the sensor's clock by pulses `spacing` [s] apart that have switched its beam off since
+        the last run; to be called before `begin`. The rate known so far is kept if too few pulses are found.
+        """
+        last = self._resampler.last
+        if last is None or self._sensor.history < _LEAST_HISTORY:
+            return
+        time, is_lit = self._resampler.values(np.fmax(self._course.time, self._marked_until))
+        known = self._known_rate(last[1])
+        rate = pulse_rate(spacing, time, is_lit, self._sensor.rate if known is None else known.value)
+        if rate is not None:
+            self._observed = rate if known is None else rate.combined(known), last[1]
+
     def mark(self, clock: SampleClock, pulses: Pulses) -> bool:
         """Align the sensor's clock by pulses that have switched its beam off. Returns False if too few pulses are found
         in the values, or if the relation of the clocks is still unknown.
@@ -171,10 +110,12 @@ class SensorTrack:
         line = self._line(clock)
         if line is None:
             return False
+        self._marked_until = line.time
         # times relative to the newest reading, to avoid rounding errors on clocks that have run for weeks
         begin = line.time_at(0.0)
         time, is_lit = self._resampler.values(begin)
-        mark = marked_point(pulses, time - line.time, is_lit, line.rate, line.seconds - self._delay)
+        rate = self._known_rate(line.time) or Rate(line.rate, _FIRST_SPREAD)
+        mark = marked_point(pulses, time - line.time, is_lit, rate, line.seconds - self._delay)
         self._mark = None if mark is None else replace(mark, time=line.time + mark.time)
         return mark is not None
 
@@ -195,6 +136,10 @@ class SensorTrack:
     def alignment(self, clock: SampleClock) -> Alignment:
         """Alignment of the sensor's clock in this run; `offset`, `rate` and `residual` are NaN while unknown."""
         line, last = self._line(clock), self._resampler.last
+        if line is not None and self._mark is not None:
+            # one line for the whole run, from the pulses to the present
+            rise = line.seconds - self._delay - self._mark.seconds
+            line = replace(line, rate=rise / (line.time - self._mark.time))
         behind = self._asked if last is None else self._course.time - last[1]
         return Alignment(
             sensor=self._name,
@@ -224,6 +169,7 @@ class SensorTrack:
             self._resampler.clear()
             self._plausibility.restart()
             self._sensor, self._course, self._mark = SensorClock(), Course(), None
+            self._observed, self._marked_until = None, -np.inf
             last = None
         newest = np.maximum.accumulate(np.concatenate(([-np.inf if last is None else last[1]], time[:-1])))
         fresh = np.flatnonzero(time > newest)
@@ -241,9 +187,37 @@ class SensorTrack:
         last = self._resampler.last
         if last is None or self._sensor.history < _LEAST_HISTORY:
             return None
-        if self._mark is not None:
-            mark, rate = self._mark, self._sensor.rate * clock.rate
-            return Line(last[1], mark.seconds + rate * (last[1] - mark.time) + self._delay, rate)
         arrival = self._sensor.offset + self._sensor.rate * last[1]
-        seconds = float(clock.seconds(np.array([arrival]))[0]) + self._delay
-        return None if np.isnan(seconds) else Line(last[1], seconds, self._sensor.rate * clock.rate)
+        seconds = float(clock.seconds(np.array([arrival]))[0])
+        if np.isnan(seconds):
+            return None
+        line = Line(last[1], seconds, self._sensor.rate * clock.rate)
+        if self._mark is not None:
+            line = self._marked_line(self._mark, line, float(np.hypot(self._sensor.residual, clock.residual)))
+        return replace(line, seconds=line.seconds + self._delay)
+
+    def _marked_line(self, mark: Mark, arrived: Line, residual: float) -> Line:
+        """The line through the mark: its rate is that from the pulses between the runs, until the drift of the clocks
+        may exceed the scatter of the arrivals, and from then on that of `arrived`, the line from the arrivals with the
+        given residual.
+        """
+        passed = arrived.time - mark.time
+        if passed < _SETTLED:
+            self._lateness = arrived.seconds_at(mark.time) - mark.seconds
+        seconds = arrived.seconds - self._lateness
+        known = self._known_rate(arrived.time)
+        if known is None:
+            return replace(arrived, seconds=seconds)
+        drift, scatter = mark.uncertainty**2 + (known.uncertainty * passed) ** 2, 2.0 * residual**2
+        share = scatter / (drift + scatter)
+        marked = mark.seconds + known.value * passed
+        return Line(
+            arrived.time, seconds + share * (marked - seconds), arrived.rate + share * (known.value - arrived.rate)
+        )
+
+    def _known_rate(self, time: float) -> Rate | None:
+        """The rate from the pulses between the runs at the sensor's `time` [s]; None without such pulses."""
+        if self._observed is None:
+            return None
+        rate, observed = self._observed
+        return rate.aged(time - observed)
