@@ -7,11 +7,14 @@ For each method:
 1. `rockbench check` measures the delay that is left and says what `hardware.lasers.delay` should be. With
    `--known-delay` it is that of the filter cards, which leaves the biases of the method itself.
 2. With that value, sessions that each open the bench anew: where each laser's value was placed, against where it was
-   really taken, after the first block and at the end. The DAQ's channels lag by the delay of their filter cards, and
-   the lasers are to lag by the same. Time stamps count 10 us; what an exposure is later than its stamp is taken out.
+   really taken, after the first block and at the end, and where the final alignment of the run, which the data file
+   stores, places the first block. The DAQ's channels lag by the delay of their filter cards, and the lasers are to lag
+   by the same. Time stamps count 10 us; what an exposure is later than its stamp is taken out.
 
 watch: the sample clock is read by a process of its own (`drivers.daqmx.clock_watch`). marker: pulses of a counter
-switch the lasers off at arming (`drivers.timebase.marking`).
+switch the lasers off between the runs and at arming (`drivers.timebase.marking`).
+
+The lateness of the machine is printed beside each session: of 99 in 100 short sleeps, and the worst.
 """
 
 import argparse
@@ -58,11 +61,11 @@ def error(one: Alignment, truth: dict[str, float], zero: float, clock: float, la
     return one.offset + one.rate * sensor + one.delay - (at + lag)
 
 
-PLACES = ("at the marks", "after the first block", "at the end")
+PLACES = ("at the marks", "after the first block", "at the end", "first block in the final alignment")
 
 
 def session(hardware: Hardware, lag: float, seconds: float) -> list[tuple[float, ...]]:
-    """For each laser: its errors at `PLACES` [s], and that of its rate at the end [1]. Without marks, the first place
+    """For each laser: its errors at `PLACES` [s], and that of its rate in the end [1]. Without marks, the first place
     is the start of the run."""
     with HardwareRig(hardware, lead=LEAD) as rig:
         rig.arm()
@@ -83,7 +86,7 @@ def session(hardware: Hardware, lag: float, seconds: float) -> list[tuple[float,
             middle = -0.5 * rig.skipped / rig.sample_rate
             found += [
                 [error(one, laser, zero, clock, lag, place) for one, laser in pairs]
-                for place in ((middle, at) if block == 1 else (at,))
+                for place in ((middle, at) if block == 1 else (at, BLOCK / rig.sample_rate))
             ]
             rates = [one.rate - clock * laser["nominal"] / laser["rate"] for one, laser in pairs]
         rig.stop()
@@ -102,13 +105,14 @@ def measure(method: str, seconds: float, restarts: int, *, known: bool) -> bool:
         print(f"{method}: delay as configured {1e3 * hardware.lasers.delay:.3f} ms, {source} {1e3 * delay:.3f} ms")
         hardware = hardware.model_copy(update={"lasers": hardware.lasers.model_copy(update={"delay": delay})})
         found: list[tuple[float, ...]] = []
-        print(f"{'session':>7}  laser 1, laser 2: error {', '.join(PLACES)}, of the rate at the end [us, ppm]")
+        print(f"{'session':>7}  laser 1, laser 2: error {', '.join(PLACES)}, of the rate in the end [us, ppm]")
         for number in range(1, restarts + 1):
             with Lateness() as lateness:
                 lasers = session(hardware, lag, seconds)
             found += lasers
             row = "   ".join(" ".join(f"{1e6 * one:+8.1f}" for one in errors) for errors in lasers)
-            print(f"{number:7d}  {row}  {lateness.excuse or ''}", flush=True)
+            late = f"late {1e3 * lateness.typical:.1f}, worst {1e3 * lateness.worst:.0f} ms"
+            print(f"{number:7d}  {row}   {late}", flush=True)
     met = True
     for column, place in enumerate(PLACES):
         errors = np.array([one[column] for one in found])
