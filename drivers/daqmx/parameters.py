@@ -152,8 +152,8 @@ class Daq(Parameters):
     laser_marker: str | None = quantity(
         None,
         "",
-        "counter output whose 40 short pulses at the beginning of each run switch both serial lasers off, which aligns "
-        "their clocks; automatic: the first counter of the output's device, if the lasers respond to its pulses; if "
+        "counter output whose short pulses at the beginning of each run and between the runs switch both serial lasers "
+        "off, which aligns their clocks; automatic: the first counter of the output's device, if the lasers respond to its pulses; if "
         "absent, the clocks are aligned from the arrival times of the values",
         example="Dev1/ctr0",
     )

@@ -120,7 +120,8 @@ class Tracks:
         self.channels: tuple[Channel, ...] = tuple(track.channel for track in self._tracks)
 
     def begin(self, sample_rate: float, clock: Clock, pulses: Pulses | None = None) -> None:
-        """Begin a run with a new sample clock; the history of the sensors' clocks is kept. Before the first run, waits
+        """Begin a run with a new sample clock; the history of the sensors' clocks and the rate of the previous sample
+        clock are kept. Before the first run, waits
         until these clocks have been observed for the longest `observation_time`. `pulses` are those that have switched
         the sensors' beams off since the last run, if any.
         """
@@ -133,7 +134,7 @@ class Tracks:
             raw.clear()
         self._armed = now()
         self._sample_rate = sample_rate
-        self._clock = SampleClock(sample_rate)
+        self._clock = SampleClock(sample_rate, self._clock)
 
     def observe(self, before: float, count: int, after: float) -> None:
         """Add a reading: `count` samples had been taken at some instant between two times of the machine's clock [s].

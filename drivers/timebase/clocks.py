@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.timebase.fit import Bounds, Points, bends, floor_below, needs_refit, rate_error, typical
+from drivers.timebase.fit import Bounds, Points, Prior, bends, floor_below, needs_refit, rate_error, typical
 
 _TOLERANCE = 0.25
 """Deviation of the history from a line, in sample periods, beyond which the older half of the history is discarded.
@@ -15,6 +15,10 @@ _CONTRADICTION = 200e-6
 """Overlap of two bounds above which they contradict each other [s]: clocks that differ by 50 ppm drift apart by 100 us
 in `_RECENT`.
 """
+_WANDER = 1e-6
+"""Standard deviation of the change of the rate between two runs [1]."""
+_CERTAIN = 1e-9
+"""Smallest standard uncertainty of a rate [1]."""
 
 
 class SampleClock:
@@ -25,10 +29,13 @@ class SampleClock:
     behind the samples taken, and the bounds may contradict each other. The bound from the next sample is then ignored
     for the rest of the run; the estimate is late by the shortest transfer time, a constant that is part of the delay
     measured by the loop check.
+
+    `previous` is the clock of the previous run, whose rate is taken over with its uncertainty.
     """
 
-    def __init__(self, sample_rate: float) -> None:
+    def __init__(self, sample_rate: float, previous: "SampleClock | None" = None) -> None:
         self._sample_rate = sample_rate
+        self._prior = Prior() if previous is None else previous.expected
         self._latest, self._earliest = Bounds(), Bounds()
         self._looks: list[tuple[float, int, float]] = []
         self._counts_lag = False
@@ -59,6 +66,19 @@ class SampleClock:
         return 1.0 / (1.0 + self._slope)
 
     @property
+    def expected(self) -> Prior:
+        """The slope that is expected in a later run. The shortest delays change with the load of the machine, so that
+        the fitted line may turn by as much as they scatter, however many they are.
+        """
+        self._refresh()
+        points = self._latest.points
+        if len(points) < 2:
+            return self._prior
+        turn = max(self._residual / float(points.seconds[-1] - points.seconds[0]), _CERTAIN)
+        spread = (turn**-2 + self._prior.spread**-2) ** -0.5
+        return Prior(self._slope, float(np.hypot(spread, _WANDER)))
+
+    @property
     def residual(self) -> float:
         """Root mean square distance [s] of the bounds in the history from the fitted line."""
         self._refresh()
@@ -70,12 +90,12 @@ class SampleClock:
             return
         self._fitted = history
         self._take_looks()
-        self._slope = rate_error(self._sides())
+        self._slope = rate_error(self._sides(), self._prior)
         tolerance = _TOLERANCE / self._sample_rate
         while any(bends(points, sign * self._slope, tolerance) for points, sign in self._sides()):
             self._latest.forget()
             self._earliest.forget()
-            self._slope = rate_error(self._sides())
+            self._slope = rate_error(self._sides(), self._prior)
         sides = self._sides()
         self._offset = float(np.mean([sign * floor_below(points, sign * self._slope) for points, sign in sides]))
         off = np.concatenate([self._off(points, sign) for points, sign in sides])
@@ -158,10 +178,10 @@ class SensorClock:
         if not len(self._bounds.points) or not needs_refit(self.history, self._fitted):
             return
         self._fitted = self.history
-        self._slope = rate_error([(self._bounds.points, 1.0)])
+        self._slope = rate_error([(self._bounds.points, 1.0)], Prior())
         while bends(self._bounds.points, self._slope, _SENSOR_TOLERANCE):
             self._bounds.forget()
-            self._slope = rate_error([(self._bounds.points, 1.0)])
+            self._slope = rate_error([(self._bounds.points, 1.0)], Prior())
         points = self._bounds.points
         floor = floor_below(points, self._slope)
         delay = points.delay - self._slope * points.seconds - floor

@@ -98,21 +98,29 @@ def needs_refit(history: float, fitted: float) -> bool:
     return history - fitted >= min(_GROWTH * history, _PATIENCE)
 
 
-def rate_error(sides: Sequence[tuple[Points, float]]) -> float:
+@dataclass(frozen=True)
+class Prior:
+    """Normal prior of a relative rate error [1]; by default that of two quartz clocks."""
+
+    mean: float = 0.0
+    spread: float = _RATE_SPREAD
+
+
+def rate_error(sides: Sequence[tuple[Points, float]], prior: Prior) -> float:
     """Posterior mean of the common slope of the lines that bound the points of `sides` from below.
 
     Each side has a sign; its delays grow by sign times slope per second. Two-sided bounds have the signs +1 and -1.
     """
     given = [_side(points.seconds, points.delay, sign) for points, sign in sides]
-    rough = _most_probable(given)
+    rough = _most_probable(given, prior)
     given = [_without_stalls(side, rough) for side in given]
-    mode = _most_probable(given)
+    mode = _most_probable(given, prior)
     steps = np.concatenate((-_STEPS, [0.0], _STEPS))
-    level = _log_posterior(given, mode + steps)
+    level = _log_posterior(given, mode + steps, prior)
     inside = steps[level > level[_STEPS.size] - _NEGLIGIBLE]
     low, high = 2.0 * float(inside.min()), 2.0 * float(inside.max())
     slopes = mode + np.linspace(low, high, _GRID, dtype=np.float64)
-    weight = _log_posterior(given, slopes)
+    weight = _log_posterior(given, slopes, prior)
     weight = np.exp(weight - weight.max())
     return float(np.average(slopes, weights=weight))
 
@@ -139,12 +147,12 @@ def _without_stalls(side: _Side, slope: float) -> _Side:
     return _side(side.seconds[kept], side.delay[kept], side.sign)
 
 
-def _most_probable(sides: Sequence[_Side]) -> float:
+def _most_probable(sides: Sequence[_Side], prior: Prior) -> float:
     """The slope at which the derivative of the log posterior changes its sign."""
     low, high = -_LARGEST, _LARGEST
     for _ in range(_HALVINGS):
         slope = 0.5 * (low + high)
-        gain = -slope / _RATE_SPREAD**2
+        gain = (prior.mean - slope) / prior.spread**2
         for side in sides:
             above = side.delay - side.sign * slope * side.seconds
             touching = int(above.argmin())
@@ -154,9 +162,9 @@ def _most_probable(sides: Sequence[_Side]) -> float:
     return 0.5 * (low + high)
 
 
-def _log_posterior(sides: Sequence[_Side], slopes: NDArray[np.float64]) -> NDArray[np.float64]:
+def _log_posterior(sides: Sequence[_Side], slopes: NDArray[np.float64], prior: Prior) -> NDArray[np.float64]:
     """Log posterior of slopes, shape (m,), up to a constant, maximised over the mean delay."""
-    level = -0.5 * (slopes / _RATE_SPREAD) ** 2
+    level = -0.5 * ((slopes - prior.mean) / prior.spread) ** 2
     for side in sides:
         floor = (side.delay - np.outer(side.sign * slopes, side.seconds)).min(axis=1)
         level -= side.delay.size * np.log(side.mean - floor + _RESOLUTION)

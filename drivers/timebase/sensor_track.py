@@ -22,6 +22,10 @@ _SETTLED = 60.0
 """Time after the pulses at the beginning of a run up to which the lateness of the arrivals is estimated again [s]: half
 the history of the clocks.
 """
+_FLOOR = 0.25
+"""Standard uncertainty of the line below the arrivals, as a fraction of their root mean square distance from it: the
+shortest delays vary with the load of the machine.
+"""
 _BACK = 0.25
 """Backward step of the sensor's time [s] above which a value is not a repetition but follows a restart of the sensor's
 clock.
@@ -208,7 +212,8 @@ class SensorTrack:
         known = self._known_rate(arrived.time)
         if known is None:
             return replace(arrived, seconds=seconds)
-        drift, scatter = mark.uncertainty**2 + (known.uncertainty * passed) ** 2, 2.0 * residual**2
+        drift = mark.uncertainty**2 + (known.uncertainty * passed) ** 2
+        scatter = 2.0 * (_FLOOR * residual) ** 2
         share = scatter / (drift + scatter)
         marked = mark.seconds + known.value * passed
         return Line(

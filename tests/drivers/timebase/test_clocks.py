@@ -86,6 +86,26 @@ def test_the_sample_clock_is_found_between_its_bounds(error: float) -> None:
     assert 0.0 < clock.residual < 1e-3
 
 
+def test_the_rate_of_the_previous_run_is_taken_over() -> None:
+    """After 0.1 s, a first clock knows no more than that quartz clocks differ by tens of ppm."""
+    daq, first = Daq(8, 4000.0, 40e-6), SampleClock(2000.0)
+    for block in range(1, 300):
+        daq.wait_for(200 * block - 1)
+        for _ in range(6):
+            first.observe(*daq.look())
+    assert first.expected.mean == pytest.approx(-40e-6, abs=3e-6)
+    assert 1e-6 < first.expected.spread < 10e-6
+    later = Daq(9, 5000.0, 40e-6)
+    alone, second = SampleClock(2000.0), SampleClock(2000.0, first)
+    for _ in range(20):
+        look = later.look()
+        alone.observe(*look)
+        second.observe(*look)
+    assert abs(second.rate - (1.0 + 40e-6)) < 5e-6 < abs(alone.rate - (1.0 + 40e-6))
+    # without a reading, what is known is passed on
+    assert SampleClock(2000.0, first).expected == first.expected
+
+
 @pytest.mark.parametrize("packet", [32, 100])
 def test_a_count_that_comes_in_packets_bounds_the_sample_clock_from_one_side(packet: int) -> None:
     """Looks at any time: samples have been taken that are not counted yet. A transfer takes `WAY` at least."""
