@@ -153,8 +153,8 @@ class Daq(Parameters):
         None,
         "",
         "counter output whose short pulses at the beginning of each run and between the runs switch both serial lasers "
-        "off, which aligns their clocks; automatic: the first counter of the output's device, if the lasers respond to its pulses; if "
-        "absent, the clocks are aligned from the arrival times of the values",
+        "off, which aligns their clocks; automatic: the first counter of the output's device, if the lasers respond to "
+        "its pulses; if absent, the clocks are aligned from the arrival times of the values",
         example="Dev1/ctr0",
     )
     emergency_stop: EmergencyStop | None = quantity(None, "", "contact of the emergency stop; absent if not wired")

@@ -216,6 +216,11 @@ class EmulatedLaser:
         # without the lock: the device calls this while it holds locks for which the thread of the line may wait
         self._sensor.switching = times
 
+    @property
+    def switching(self) -> bool:
+        """Whether the laser's on/off input is being opened and closed, as requested by `switch`."""
+        return self._sensor.switching.size > 0
+
     def target(self, place: Literal["too close", "too far", "none"] | None) -> None:
         """Replace the target by one that is too close, too far or missing; None restores the original target."""
         with self._lock:

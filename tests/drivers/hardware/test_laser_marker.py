@@ -64,6 +64,21 @@ def test_the_lasers_are_aligned_at_arming(laboratory: Laboratory) -> None:
             assert not np.isnan(rig.channels[column].to_unit(block.counts[:, column])).all()
 
 
+def test_pulses_between_the_runs_give_the_rates(laboratory: Laboratory) -> None:
+    """Pulses for one second, then for three; the arrivals give the rates to some 10 ppm in the first block."""
+    with HardwareRig(marked_by(laboratory, AUTOMATIC), lead=LEAD - BLOCK) as rig:
+        for pause, largest in ((0.0, 30e-6), (2.0, 5e-6)):
+            rig.clock.wait_until(rig.clock.now() + pause)
+            started(rig)
+            rig.read(BLOCK)
+            for one, laser in zip(rig.alignments, laboratory.lasers, strict=True):
+                true = (laboratory.bench.rate_true / rig.sample_rate) * 4000.0 / laser.rate_true
+                assert abs(one.rate - true) < largest
+            rig.stop()
+    # closing the rig ends the pulses
+    assert not laboratory.lasers[0].switching
+
+
 def test_lasers_that_do_not_follow_are_named(laboratory: Laboratory) -> None:
     with HardwareRig(marked_by(laboratory, "Dev1/ctr1"), lead=LEAD - BLOCK) as rig:
         started(rig)
