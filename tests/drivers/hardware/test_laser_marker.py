@@ -75,6 +75,7 @@ def test_pulses_between_the_runs_give_the_rates(laboratory: Laboratory) -> None:
                 true = (laboratory.bench.rate_true / rig.sample_rate) * 4000.0 / laser.rate_true
                 assert abs(one.rate - true) < largest
             rig.stop()
+            assert laboratory.lasers[0].switching
     # closing the rig ends the pulses
     assert not laboratory.lasers[0].switching
 
