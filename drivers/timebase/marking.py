@@ -199,13 +199,14 @@ def pulse_rate(spacing: float, time: NDArray[np.float64], is_lit: NDArray[np.boo
     phase = rate * dark / spacing
     first = float(np.angle(np.exp(2j * np.pi * phase).mean())) / (2.0 * np.pi)
     edges = spacing * np.rint(phase - first)
+    line = np.polynomial.Polynomial.fit(dark, edges, 1)
     kept = np.ones(onsets.size, dtype=np.bool_)
     for _ in range(3):
-        line = np.polynomial.Polynomial.fit(dark[kept], edges[kept], 1)
-        # an onset follows its edge by up to one cycle, the line by half a cycle on average
+        # an onset is up to one cycle later than its edge, by half a cycle on average
         kept = np.abs(edges - line(dark)) < _NEAR * cycle
         if np.count_nonzero(kept) < max(_ENOUGH, _REGULAR * onsets.size):
             return None
+        line = np.polynomial.Polynomial.fit(dark[kept], edges[kept], 1)
     edges, lit, dark = edges[kept], time[onsets - 1][kept] - time[onsets[0]], dark[kept]
     slope, span = float(line.deriv()(0.0)), float(dark[-1] - dark[0])
 
@@ -217,14 +218,14 @@ def pulse_rate(spacing: float, time: NDArray[np.float64], is_lit: NDArray[np.boo
     best, step = slope, largest
     for _ in range(_ZOOMS):
         # the width is a concave function of the rate
-        rates = best + step * np.linspace(-1.0, 1.0, 11)
+        rates = best + step * np.linspace(-1.0, 1.0, 11, dtype=np.float64)
         best, step = float(rates[np.argmax(width(rates))]), 0.25 * step
     if width(np.array([best])) <= 0.0:
         # the sensor's jitter exceeds the spacing of the phases: the standard uncertainty of the fitted line
         return Rate(slope, largest / float(np.sqrt(dark.size)))
-    steps = largest * 0.5 ** np.arange(20)
-    below, above = (steps[width(best + sign * steps) <= 0.0].min(initial=largest) for sign in (-1.0, 1.0))
-    rates = np.linspace(best - below, best + above, _DEVIATIONS.size)
+    steps = np.ldexp(largest, -np.arange(20))
+    below, above = (float(steps[width(best + sign * steps) <= 0.0].min(initial=largest)) for sign in (-1.0, 1.0))
+    rates = np.linspace(best - below, best + above, _DEVIATIONS.size, dtype=np.float64)
     # the start of the pulses is assumed uniformly distributed between the bounds at each rate
     weight = np.maximum(width(rates), 0.0)
     value = float(np.average(rates, weights=weight))

@@ -40,15 +40,15 @@ class Laboratory:
         if self.pulses is not None:
             taken = self.sent.taken
             self.code[dark((taken - begin) * (1.0 + DAQ), self.pulses) & (taken < end)] = OFF
-        self._now = end
+        self.now = end
 
     def arm(self) -> bool:
         """Begin a run; returns whether its pulses were found."""
-        self._feed(self._now)
+        self._feed(self.now)
         if self.pulses is not None:
             self.laser.observe_pulses(self.pulses.spacing)
         self.laser.begin()
-        self._daq = Daq(7, self._now + 0.1, DAQ)
+        self._daq = Daq(7, self.now + 0.1, DAQ)
         self.clock = SampleClock(SAMPLE_RATE)
         self.code[dark(self.true(self.sent.taken), AT_ARMING)] = OFF
         self.run(AT_ARMING.end + 0.05)
@@ -56,12 +56,12 @@ class Laboratory:
 
     def run(self, end: float) -> None:
         """Acquire up to second `end` of the sample clock."""
-        while (passed := float(self.true(np.array([self._now]))[0])) < end:
+        while (passed := float(self.true(np.array([self.now]))[0])) < end:
             self._daq.wait_for(round((passed + self.step) * SAMPLE_RATE))
             for _ in range(6):
                 self.clock.observe(*self._daq.look())
-            self._now = self._daq.now
-            self._feed(self._now)
+            self.now = self._daq.now
+            self._feed(self.now)
             self.laser.reach(self.clock)
 
     def true(self, moment: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -116,7 +116,7 @@ def test_the_rate_is_kept_for_a_run_that_follows_at_once() -> None:
     laboratory = Laboratory(stream(7, 30.0, SENSOR), 10.0)
     assert laboratory.arm()
     laboratory.run(3.0)
-    begin = laboratory._now
+    begin = laboratory.now
     laboratory.rest(begin + 0.02, begin + 0.05)
     assert laboratory.arm()
     laboratory.run(8.0)
