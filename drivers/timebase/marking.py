@@ -200,7 +200,7 @@ def pulse_rate(spacing: float, time: NDArray[np.float64], is_lit: NDArray[np.boo
     first = float(np.angle(np.exp(2j * np.pi * phase).mean())) / (2.0 * np.pi)
     edges = spacing * np.rint(phase - first)
     line = np.polynomial.Polynomial.fit(dark, edges, 1)
-    kept = np.ones(onsets.size, dtype=np.bool_)
+    kept = np.zeros(onsets.size, dtype=np.bool_)
     for _ in range(3):
         # an onset is up to one cycle later than its edge, by half a cycle on average
         kept = np.abs(edges - line(dark)) < _NEAR * cycle

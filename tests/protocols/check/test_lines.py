@@ -263,5 +263,5 @@ def test_the_alignment_is_stated_with_its_method() -> None:
     assert lines[0].what.startswith("alignment from arrival times")
     assert lines[0].measured == 40e-6
     assert lines[2].what.startswith("alignment by pulses")
-    assert (lines[2].measured, lines[2].expected) == (3e-6, pytest.approx(3.5e-6))
+    assert (lines[2].measured, lines[2].expected) == (3e-6, pytest.approx(1.75e-6))
     assert lines[1].measured == lines[3].measured == 3e-3
