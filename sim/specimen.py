@@ -67,12 +67,24 @@ class Frame(Parameters):
         rows: list[tuple[float, float]] = []
         right: list[float] = []
         for omega, xi in zip(self.natural_frequencies, (self.xi1, self.xi2), strict=True):
-            top = self.k2 / (self.k2 - omega * omega * self.m2)
-            norm = self.m1 + self.m2 * top * top
-            rows.append((1.0 / norm, (top - 1.0) ** 2 / norm))
+            rows.append(self._modal_shares(omega))
             right.append(2.0 * xi * omega)
         c1, c2 = np.linalg.solve(np.array(rows), np.array(right))
         return float(c1), float(c2)
+
+    @property
+    def passive_ratios(self) -> tuple[float, float]:
+        """Smallest and largest xi2 / xi1 that two dashpots can give unless one is negative: those of each one alone."""
+        first, second = self.natural_frequencies
+        alone = zip(self._modal_shares(first), self._modal_shares(second), strict=True)
+        smallest, largest = sorted(upper / lower * first / second for lower, upper in alone)
+        return smallest, largest
+
+    def _modal_shares(self, omega: float) -> tuple[float, float]:
+        """phi_1^2 and (phi_2 - phi_1)^2 [1/kg] of the mass-normalised mode with the circular frequency `omega`."""
+        top = self.k2 / (self.k2 - omega * omega * self.m2)
+        norm = self.m1 + self.m2 * top * top
+        return 1.0 / norm, (top - 1.0) ** 2 / norm
 
 
 class Block(Parameters):

@@ -10,7 +10,7 @@ from math import inf, sqrt
 
 from bench.config.backend import RigSettings
 from bench.config.model import BenchConfiguration
-from bench.config.usual import specimen_notices, unusual
+from bench.config.usual import damping_notices, specimen_notices, unusual
 from bench.guard.limits import ramp_refusal
 from sim.errors import InvalidInput
 from sim.parameters import Parameters
@@ -268,6 +268,9 @@ def _findings(configuration: BenchConfiguration) -> Iterator[str]:
         if assumed and finding.value and not 0.2 <= finding.value / assumed <= 5.0:
             ratio = finding.value / assumed
             yield f"{item}: value = {finding.value:g} is {ratio:.3g} times the assumed value, {assumed:g}"
+    frame = configuration.known_specimen.frame
+    if frame != configuration.specimen.frame:
+        yield from damping_notices(frame, "identified: ")
 
 
 def _curves(configuration: BenchConfiguration) -> Iterator[str]:

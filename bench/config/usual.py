@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from bench.config.declared import declared
 from sim.parameters import Parameters
-from sim.specimen import Specimen
+from sim.specimen import Frame, Specimen
 
 ANGULAR = "rad/s"
 """The unit of circular frequencies; unusual values are shown in Hz too."""
@@ -100,11 +100,8 @@ def scales_of(parameters: Parameters, specimen: Specimen) -> tuple[str, ...]:
 def specimen_notices(specimen: Specimen, prefix: str = "specimen.") -> Iterator[str]:
     """Notices about the assumed properties of a specimen."""
     yield from unusual(specimen, prefix)
+    yield from damping_notices(specimen.frame, f"{prefix}frame.")
     frame = specimen.frame
-    for number, dashpot in enumerate(frame.dashpots, 1):
-        if dashpot < 0.0:
-            ratios = f"{prefix}frame.xi1 = {frame.xi1:g}, xi2 = {frame.xi2:g}"
-            yield f"{ratios} give a dashpot c{number} = {dashpot:.3g} N s/m; a negative dashpot adds energy"
     nominal = specimen.spring_k1 or frame.k1
     if not 1.0 / _SPRING_OFF <= nominal / frame.k1 <= _SPRING_OFF:
         yield f"{prefix}spring_k1 = {nominal:g} N/m is {nominal / frame.k1:.3g} times frame.k1 = {frame.k1:g} N/m"
@@ -113,6 +110,18 @@ def specimen_notices(specimen: Specimen, prefix: str = "specimen.") -> Iterator[
         if not 1.0 / _SPRING_OFF <= ratio <= _SPRING_OFF:
             item, promised = f"{prefix}springs[{place}].k_c = {spring.k_c:g} N/m", spring.label * nominal
             yield f"{item} is {ratio:.3g} times {promised:.4g} N/m, the nominal value for its label {spring.label:g}"
+
+
+def damping_notices(frame: Frame, prefix: str) -> Iterator[str]:
+    """A notice if the damping ratios of the frame make a dashpot negative, with ratios that do not."""
+    for number, dashpot in enumerate(frame.dashpots, 1):
+        if dashpot < 0.0:
+            # rounded inwards
+            low, high = 1.001 * frame.passive_ratios[0], 0.999 * frame.passive_ratios[1]
+            yield (
+                f"{prefix}xi1 = {frame.xi1:g}, xi2 = {frame.xi2:g} give a dashpot c{number} = {dashpot:.3g} N s/m; a "
+                f"negative dashpot adds energy: use ratios with xi2/xi1 from {low:.4g} to {high:.4g}"
+            )
 
 
 def _others(outside: Sequence[object]) -> str:

@@ -2,9 +2,11 @@
 
 import re
 from collections.abc import Callable
+from datetime import UTC, datetime
 from math import pi
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from bench.app.catalogue import load_protocol
@@ -20,6 +22,7 @@ from drivers.hardware.parameters import CoilCurrent, Hardware, TableAcceleration
 from protocols.check.protocol import CheckParameters
 from protocols.harmonic.protocol import HarmonicParameters
 from sim.errors import InvalidInput
+from sim.identified import Finding, Identified
 from sim.specimen import Frame, Specimen, Spring
 
 FILE = Path("bench.toml")
@@ -137,7 +140,7 @@ def test_what_physics_decides_is_refused(text: str, item: str) -> None:
         (lambda: _specimen(k1=0.21344, k2=0.05645), r"specimen\.frame\.k1 = 0\.21344 N/m is below the usual"),
         (
             lambda: _specimen(xi1=0.02, xi2=0.01),
-            r"specimen\.frame\.xi1 = 0\.02, xi2 = 0\.01 .* dashpot c1 = -0\.5\d* N s/m",
+            r"specimen\.frame\.xi1 = 0\.02, xi2 = 0\.01 .* dashpot c1 = -0\.5\d* N s/m; .* xi2/xi1 from \d",
         ),
         (
             lambda: BenchConfiguration(specimen=Specimen(springs=(Spring(label=0.25, k_c=5.3),))),
@@ -149,6 +152,45 @@ def test_what_is_merely_unusual_gets_a_notice(configuration: Callable[[], BenchC
     found = review(configuration())
     assert found.refusals == ()
     assert any(re.search(notice, each) for each in found.notices), found.notices
+
+
+@pytest.mark.parametrize(("xi1", "xi2", "which"), [(0.02, 0.01, 0), (0.01, 0.09, 1)])
+def test_a_negative_dashpot_is_named_with_the_ratios_that_avoid_it(xi1: float, xi2: float, which: int) -> None:
+    (notice,) = (each for each in review(_specimen(xi1=xi1, xi2=xi2)).notices if "dashpot" in each)
+    assert f"give a dashpot c{which + 1} = {_dashpots(xi1, xi2)[which]:.3g} N s/m;" in notice
+    ends = re.search(r"from ([\d.]+) to ([\d.]+)$", notice)
+    assert ends is not None
+    low, high = map(float, ends.groups())
+    for inside, outside in ((low, 0.995 * low), (high, 1.005 * high)):
+        assert min(_dashpots(xi1, inside * xi1)) >= 0.0
+        assert min(_dashpots(xi1, outside * xi1)) < 0.0
+
+
+def _dashpots(xi1: float, xi2: float) -> tuple[float, float]:
+    """c1, c2 of the default frame with these damping ratios, with modes from a general eigensolver."""
+    frame = Frame()
+    stiffness = np.array([[frame.k1 + frame.k2, -frame.k2], [-frame.k2, frame.k2]]) / frame.m1
+    squares, modes = np.linalg.eigh(stiffness)
+    modes /= np.sqrt(frame.m1)
+    shares = np.stack((modes[0] ** 2, (modes[1] - modes[0]) ** 2), axis=1)
+    c1, c2 = np.linalg.solve(shares, 2.0 * np.sqrt(squares) * (xi1, xi2))
+    return float(c1), float(c2)
+
+
+def test_identified_damping_ratios_that_make_a_dashpot_negative_get_a_notice() -> None:
+    date = datetime(2026, 1, 1, tzinfo=UTC)
+    findings = tuple(
+        Finding(name=name, value=value, standard_uncertainty=0.01 * value, source="decay", date=date)
+        for name, value in (("xi1", 0.02), ("xi2", 0.01))
+    )
+    (notice,) = review(BenchConfiguration(identified=Identified(findings=findings))).notices
+    assert notice.startswith("identified: xi1 = 0.02, xi2 = 0.01 give a dashpot c1 = -0.502 N s/m")
+
+
+def test_a_prediction_warns_of_a_negative_dashpot(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("specimen.toml").write_text("[frame]\nxi1 = 0.02\nxi2 = 0.01\n", encoding="utf-8")
+    assert main(["predict", "modes", "--specimen", "specimen.toml"]) == 0
+    assert "specimen.frame.xi1 = 0.02, xi2 = 0.01 give a dashpot c1 = -0.502 N s/m" in capsys.readouterr().err
 
 
 def _specimen(**frame: float) -> BenchConfiguration:
