@@ -2,17 +2,18 @@
 
 A sine barely above the uplift acceleration can start a motion whose relative changes are millions of times those of the
 inputs. The uncertainty of the inputs then limits the valid digits of the motion long before the integration does. The
-condition number and the error of the computation are therefore both stated.
+condition number and the error of the computation are therefore both stated; times are rounded to their valid digits.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from math import floor, log10, nan
+from math import floor, inf, log10, nan
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sim.excitation import SineProgram, Sweep
+from sim.ensemble import simulate_many
+from sim.excitation import SampledRecord, SineProgram, Sweep
 from sim.rocking import Motion, simulate
 from sim.specimen import Specimen
 
@@ -37,20 +38,25 @@ class Condition:
     error: float
     end_time_error: float
 
-    def rounded_end(self, end_time: float) -> float:
-        """`end_time` [s] rounded to the digits that its error leaves valid."""
-        if not 0.0 < self.end_time_error < 1.0:
-            return end_time
-        return round(end_time, floor(-log10(self.end_time_error)))
+
+UNCERTAIN = Condition(nan, nan, nan)
+"""Condition of a motion of which no digit is certain."""
+
+PERIODIC = Condition(nan, nan, 0.0)
+"""Condition of whole periods of a steady motion: not computed, since the requested end time is exact."""
 
 
-UNKNOWN = Condition(nan, nan, nan)
+def rounded_time(time: float, error: float) -> float:
+    """`time` [s] rounded to the digits that its `error` [s] leaves valid; NaN if none is valid."""
+    if not error < inf:
+        return nan
+    return time if error == 0.0 else round(time, floor(-log10(error))) or nan
 
 
 def condition(coupled: Specimen, dwell: Sweep, times: ArrayLike, motion: Motion) -> Condition:
     """Condition of `motion`, which started from rest under the sine `dwell` and is sampled at `times` [s], shape (n,).
 
-    Performs up to five runs at the tolerance FINE.
+    `motion` may be that of any solver. Performs up to five runs at the tolerance FINE.
     """
 
     def fine(specimen: Specimen, amplitude: float) -> Motion:
@@ -60,10 +66,36 @@ def condition(coupled: Specimen, dwell: Sweep, times: ArrayLike, motion: Motion)
     amplitude = dwell.amplitude[0]
     exact = fine(coupled, amplitude)
     if exact.status is not motion.status:
-        return UNKNOWN
+        return UNCERTAIN
     changed = [fine(coupled, (1.0 + CHANGE) * amplitude), *(fine(other, amplitude) for other in _changed(coupled))]
     number = max(_distance(exact, other) for other in changed) / CHANGE
-    return Condition(number, _distance(exact, motion), abs(motion.end_time - exact.end_time))
+    return Condition(number, _distance(exact, motion), _end_time_error(motion, exact, changed))
+
+
+def end_time_errors(
+    specimens: Sequence[Specimen], record: SampledRecord, motions: Sequence[Motion], scheduler: str | None = None
+) -> list[float]:
+    """Errors of the end times of `motions` [s], which started from rest under `record`; NaN for a motion that ends
+    differently at the tolerance FINE. `scheduler` is that of `sim.sweep.sweep`.
+    """
+    if not motions:
+        return []
+    larger = SampledRecord((1.0 + CHANGE) * record.acceleration, record.dt)
+    exact, changed = (
+        simulate_many(specimens, drive, peaks_from=None, tolerance=FINE, scheduler=scheduler)
+        for drive in (record, larger)
+    )
+    return [_end_time_error(*runs) for runs in zip(motions, exact, ([each] for each in changed), strict=True)]
+
+
+def _end_time_error(motion: Motion, exact: Motion, changed: Sequence[Motion]) -> float:
+    """Error of the end time [s] of `motion`: its difference from that of the run `exact` at the tolerance FINE, and the
+    error of the latter. `changed` are runs with an input changed by CHANGE.
+    """
+    if exact.status is not motion.status:
+        return nan
+    shifts = [abs(each.end_time - exact.end_time) if each.status is exact.status else inf for each in changed]
+    return abs(motion.end_time - exact.end_time) + FINE / CHANGE * max(shifts)
 
 
 def _changed(coupled: Specimen) -> Iterator[Specimen]:

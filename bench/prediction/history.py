@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from bench.comparators.catalogue import solve
 from bench.datafile.tables import Column, Table
-from bench.prediction.conditioning import UNKNOWN, Condition, condition
+from bench.prediction.conditioning import PERIODIC, Condition, condition, rounded_time
 from bench.prediction.requests import HistoryRequest
 from bench.prediction.steady import amplitude_of
 from bench.progress import Progress, silent
@@ -41,8 +41,7 @@ QUANTITIES: dict[str, tuple[str, str]] = {
 class History:
     """Motion over time: `values` contains an array of shape (n,) for each of `QUANTITIES`.
 
-    `status` states how the motion ended at `end_time` [s]; `impacts` is the number of impacts until then. `condition`
-    is known only for a motion from rest by the solver taylor.
+    `status` states how the motion ended at `end_time` [s]; `impacts` is the number of impacts until then.
     """
 
     omega: float
@@ -52,7 +51,7 @@ class History:
     end_time: float
     impacts: int
     values: Mapping[str, NDArray[np.float64]]
-    condition: Condition = UNKNOWN
+    condition: Condition = PERIODIC
 
     def peak(self, name: str) -> float:
         """Largest absolute value of a sampled quantity; NaN if there are no samples."""
@@ -101,14 +100,14 @@ def runs_table(made: Sequence[History]) -> Table:
         np.array([history.status for history in made], np.str_), "", "final status of the motion"
     )
     columns["end_time_s"] = Column(
-        np.array([history.condition.rounded_end(history.end_time) for history in made], np.float64),
+        np.array([rounded_time(history.end_time, history.condition.end_time_error) for history in made], np.float64),
         "s",
-        "time at which the motion ended, rounded to the digits that its error leaves valid",
+        "time at which the motion ended, rounded to the digits that its error leaves valid; absent if none is valid",
     )
     columns["end_time_error_s"] = Column(
         np.array([history.condition.end_time_error for history in made], np.float64),
         "s",
-        "error of the end time: its difference from that of a run at the finest tolerance",
+        "error of the end time, from a run at the finest tolerance; absent if that run ends differently",
     )
     columns["impacts"] = Column(
         np.array([history.impacts for history in made], np.int64), "1", "number of impacts until the end"
@@ -164,7 +163,7 @@ def _from_rest(coupled: Specimen, omega: float, amplitude: float, request: Histo
             _filled(motion.samples, times.size)[:, [0, 1, 4]],
             _filled(bare.samples, times.size)[:, :2],
         ),
-        condition=condition(coupled, dwell, times, motion) if request.solver == "taylor" else UNKNOWN,
+        condition=condition(coupled, dwell, times, motion),
     )
 
 

@@ -14,6 +14,7 @@ from bench.control.stroke_fit import Method, periods_of
 from bench.control.target import Reach
 from bench.datafile.tables import Column, Table
 from bench.prediction.bands import Bands, record_bands
+from bench.prediction.conditioning import end_time_errors, rounded_time
 from bench.prediction.requests import BandStudyRequest, RecordsRequest, SeismicRequest
 from bench.prediction.steady import rounded
 from bench.progress import Progress, silent
@@ -30,12 +31,14 @@ Band = tuple[float, float] | None
 class SeismicCurve:
     """Prediction for one record: the table motion, and a gain for each stiffness.
 
-    `bands` are the bands of alpha_2 at each stiffness, if requested.
+    `time_errors` are the errors of the times of overturning [s] (`bench.prediction.conditioning`), NaN if the block
+    does not overturn; `bands` are the bands of alpha_2 at each stiffness, if requested.
     """
 
     accelerogram: Accelerogram
     prepared: PreparedMotion
     gains: list[SeismicGain]
+    time_errors: list[float]
     bands: Bands | None = None
 
 
@@ -132,7 +135,11 @@ def _curve(
         )
     except InvalidInput as refused:
         raise InvalidInput(f"{refused.item} of {record.name}", refused.value, refused.allowed) from None
-    return SeismicCurve(record, prepared, seismic_curve(specimen, prepared.record, betas, request.scheduler))
+    gains = seismic_curve(specimen, prepared.record, betas, request.scheduler)
+    toppled = [i for i, gain in enumerate(gains) if gain.motion.overturned is not None]
+    coupled, motions = [specimen.coupled(betas[i]) for i in toppled], [gains[i].motion for i in toppled]
+    errors = dict(zip(toppled, end_time_errors(coupled, prepared.record, motions, request.scheduler), strict=True))
+    return SeismicCurve(record, prepared, gains, [errors.get(i, np.nan) for i in range(len(gains))])
 
 
 DIGITS = 9
@@ -161,7 +168,13 @@ GAINS: Columns = {
     "toppled_time_s": (
         np.float64,
         "s",
-        "time of overturning since the start of the motion; absent if the block did not overturn",
+        "time of overturning since the start of the motion, rounded to the digits that its error leaves valid; absent "
+        "if the block did not overturn or no digit is valid",
+    ),
+    "toppled_time_error_s": (
+        np.float64,
+        "s",
+        "error of the time of overturning, from a run at the finest tolerance; absent if that run ends differently",
     ),
     "impacts": (np.int64, "1", "number of impacts of the block"),
     "u1_max_m": (np.float64, "m", "greatest |u1|; absent if the run ended early"),
@@ -199,7 +212,10 @@ MOTIONS: Columns = {
 
 def gains_table(curves: Sequence[SeismicCurve]) -> Table:
     """Table with one row for each record, band and stiffness."""
-    table = _table(GAINS, [_gain(curve, gain) for curve in curves for gain in curve.gains])
+    table = _table(
+        GAINS,
+        [_gain(curve, *each) for curve in curves for each in zip(curve.gains, curve.time_errors, strict=True)],
+    )
     found = [curve.bands for curve in curves if curve.bands is not None]
     if len(found) < len(curves):
         return table
@@ -212,7 +228,7 @@ def motions_table(curves: Sequence[SeismicCurve]) -> Table:
     return _table(MOTIONS, [_motion(curve) for curve in curves])
 
 
-def _gain(curve: SeismicCurve, gain: SeismicGain) -> list[Any]:
+def _gain(curve: SeismicCurve, gain: SeismicGain, time_error: float) -> list[Any]:
     motion, bare = gain.motion, gain.bare
     completed, toppled = gain.alpha_2 is not None, motion.overturned is not None
     peaks = (motion.peaks.u1, motion.peaks.drift, motion.peaks.theta) if completed else (np.nan,) * 3
@@ -224,7 +240,8 @@ def _gain(curve: SeismicCurve, gain: SeismicGain) -> list[Any]:
         np.nan if gain.alpha_2 is None else gain.alpha_2,
         str(motion.status),
         toppled,
-        motion.end_time if toppled else np.nan,
+        rounded_time(motion.end_time, time_error),
+        time_error,
         motion.impacts,
         *peaks,
         bare.u1,

@@ -3,6 +3,7 @@
 import csv
 import json
 from itertools import pairwise
+from math import floor, log10
 from pathlib import Path
 from typing import Any
 
@@ -129,6 +130,8 @@ def test_a_block_that_topples_has_a_time_and_no_gain(capsys: pytest.CaptureFixtu
         assert gain["status"].startswith("overturned about ")
         assert gain["alpha_1"] is gain["alpha_2"] is gain["drift_max_m"] is None
         assert 0.0 < gain["toppled_time_s"] < answer["motions"][0]["duration_s"]
+        assert 0.0 < gain["toppled_time_error_s"] < 1e-6
+        assert gain["toppled_time_s"] == round(gain["toppled_time_s"], floor(-log10(gain["toppled_time_error_s"])))
     assert (gains[0]["band_low_hz"], gains[0]["band_high_hz"]) == (None, None)
     assert answer["table_band"].startswith("none")
     with Path("gains.csv").open(encoding="utf-8", newline="") as file:
