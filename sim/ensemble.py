@@ -195,7 +195,7 @@ def _rocking(chunk: Sequence[_Member]) -> Floats:
     q = np.concatenate([parameters(specimen, orbit.omega, orbit.amplitude) for orbit, specimen in chunk])
     found = newton(q, sections[of], slopes[of], accuracy=None)
     for i in np.flatnonzero(~found.found).tolist():
-        solution = follow(origin[of[i]], sections[of[i]], q[i])
+        solution, _ = follow(origin[of[i]], sections[of[i]], q[i])
         if solution is not None:
             found.put(i, solution)
     return found.peaks[:, :2]

@@ -133,7 +133,8 @@ def _follow_strip(strip: _Strip) -> tuple[Floats, Floats, NDArray[np.complex128]
             # continue from the previous row in shorter steps, or from a neighbour in this row
             starts = [(rows[-1], before, j), (row, q, j - 1), (row, q, min(j + 1, len(q) - 1))]
             reached = ((at, origin[k], k) for at, origin, k in starts if k >= 0 and at.found[k])
-            found = next(filter(None, (follow(origin, at.section[k], q[j]) for at, origin, k in reached)), None)
+            tried = (follow(origin, at.section[k], q[j])[0] for at, origin, k in reached)
+            found = next(filter(None, tried), None)
             if found is not None:
                 row.put(j, found)
         rows.append(row)

@@ -40,8 +40,22 @@ STENCIL: dict[Accuracy, tuple[Floats, Floats]] = {
 }
 """Central differences: nodes in units of the step, and their weights."""
 
+STEEP, GENTLE, SHORT = 100.0, 20.0, 1e-4
+"""Largest derivative, relative to the scales of x, up to which these steps are used. Beyond it, they are reduced such
+that the image moves as with a derivative of GENTLE; SHORT is the fraction of the steps for a first estimate where the
+whole ones leave the domain of the map. The relative error of a dominant multiplier is then about 1e-12 times its
+modulus.
+"""
+
+STEEPEST = 1e7
+"""Derivative beyond which an orbit counts as not found: rounding errors of its section grow to visible changes of its
+peaks within a period, and its multipliers would be inaccurate.
+"""
+
 CLOSURE = 1e-12
-"""Scaled mismatch over one period below which an orbit counts as closed."""
+"""Scaled mismatch over one period below which an orbit counts as closed, or this part of a derivative above STEEP,
+because rounding errors of the section grow by the derivative.
+"""
 
 SLOW = 0.1
 """A known Jacobian is kept while each Newton step reduces the mismatch to less than this fraction."""
@@ -144,9 +158,30 @@ def images(q: Floats, x: Floats, *, watch_peaks: bool = False) -> tuple[Floats, 
 
 def jacobians(q: Floats, x: Floats, accuracy: Accuracy = 4) -> Floats:
     """Derivatives of the map at x, shape (n, 6, 6); NaN where the map is not defined around x."""
+    found = _differences(q, x, accuracy, np.ones(len(x)))
+    # a large derivative may carry these steps out of the domain of the map
+    lost = np.flatnonzero(np.isnan(found).any(axis=(1, 2)))
+    if lost.size:
+        found[lost] = _differences(q[lost], x[lost], accuracy, np.full(lost.size, SHORT))
+    growth = _growth(q, found)
+    found[lost[~(growth[lost] > STEEP)]] = np.nan
+    steep = np.flatnonzero(growth > STEEP)
+    if steep.size:
+        found[steep] = _differences(q[steep], x[steep], accuracy, GENTLE / growth[steep])
+    return found
+
+
+def _growth(q: Floats, jacobian: Floats) -> Floats:
+    """Largest derivative relative to the scales of x, shape (n,); NaN where the map is not defined."""
+    sizes = scales(q)
+    return np.abs(jacobian * (sizes[:, None, :] / sizes[:, :, None])).max(axis=(1, 2))
+
+
+def _differences(q: Floats, x: Floats, accuracy: Accuracy, factors: Floats) -> Floats:
+    """Finite differences at x, shape (n, 6, 6), with steps multiplied by `factors`, shape (n,)."""
     nodes, weights = STENCIL[accuracy]
     # the actual steps, after rounding
-    steps = (x + DIFFERENCE[accuracy] * scales(q)) - x
+    steps = (x + DIFFERENCE[accuracy] * factors[:, None] * scales(q)) - x
     starts = x[:, None, None, :] + (nodes[:, None, None] * np.eye(6)) * steps[:, None, None, :]
     out, _ = images(q, starts.reshape(-1, 6))
     return np.einsum("s,nsji->nij", weights, out.reshape(len(x), nodes.size, 6, 6)) / steps[:, None, :]
@@ -167,7 +202,8 @@ def newton(q: Floats, x: Floats, known: Floats | None = None, accuracy: Accuracy
         image, seen = images(q[active], place[active], watch_peaks=True)
         mismatch = image - place[active]
         error = np.abs(mismatch / sizes[active]).max(axis=1)
-        closed, going = error < CLOSURE, error < np.minimum(10.0 * previous[active], NEAR)
+        growth = np.fmax(_growth(q[active], jacobian[active]) / STEEP, 1.0)
+        closed, going = error < CLOSURE * growth, error < np.minimum(10.0 * previous[active], NEAR)
         found[active[closed]], peaks[active[closed]] = True, seen[closed]
         keep = ~closed & going
         active, mismatch, error = active[keep], mismatch[keep], error[keep]
@@ -180,25 +216,26 @@ def newton(q: Floats, x: Floats, known: Floats | None = None, accuracy: Accuracy
             break
     if found.any() and accuracy is not None:
         jacobian[found] = jacobians(q[found], place[found], accuracy)
-        found &= np.isfinite(jacobian).all(axis=(1, 2))
+        found &= _growth(q, jacobian) < STEEPEST
     for each in (place, jacobian, peaks):
         each[~found] = np.nan
     return Solutions(place, jacobian, peaks, found)
 
 
-def follow(origin: Floats, x: Floats, target: Floats) -> Solution | None:
+def follow(origin: Floats, x: Floats, target: Floats) -> tuple[Solution | None, float]:
     """Find the fixed point for the parameters `target`, shape (18,), by continuation from `x`, which is near the fixed
     point for `origin`.
 
     The path in parameter space is a straight line. Steps grow while Newton's method converges and are halved when it
-    does not. Returns None if they become too short.
+    does not. Returns None if they become too short. The second value is the largest derivative, relative to the scales
+    of x, at the last fixed point that was found.
     """
     solution = newton(origin[None], x[None]).one(0)
     if solution is None:
-        return None
+        return None, 0.0
     span = target - origin
     if not span.any():
-        return solution
+        return solution, _steepness(origin, solution)
     done, advance = 0.0, 1.0
     section, tangent = solution.section, np.zeros(6)
     while done < 1.0:
@@ -208,14 +245,18 @@ def follow(origin: Floats, x: Floats, target: Floats) -> Solution | None:
         if found is None:
             advance *= 0.5
             if advance < SMALLEST_ADVANCE:
-                return None
+                return None, _steepness(origin + done * span, solution)
             continue
         change = found.section - section
         change[0] = (change[0] + pi) % tau - pi
         tangent = change / (place - done)
         solution, section, done = found, found.section, place
         advance *= 2.0
-    return solution
+    return solution, _steepness(target, solution)
+
+
+def _steepness(q: Floats, solution: Solution) -> float:
+    return float(_growth(q[None], solution.jacobian[None])[0])
 
 
 def extrapolated(places: Sequence[float], values: Sequence[Floats], place: float) -> Floats:

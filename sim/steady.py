@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from sim.errors import InvalidInput, RockbenchError
 from sim.excitation import SineProgram, Sweep
 from sim.linear import frame_matrices, steady_peaks, steady_response
-from sim.return_map import MOST_KNOWN, Solution, extrapolated, follow, newton, parameters
+from sim.return_map import MOST_KNOWN, STEEP, Solution, extrapolated, follow, newton, parameters
 from sim.rocking import Peaks, State, simulate
 from sim.specimen import Specimen
 
@@ -215,11 +215,14 @@ def _seed() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 def _followed(
     origin: NDArray[np.float64], section: NDArray[np.float64], specimen: Specimen, omega: float, amplitude: float
 ) -> Solution:
-    solution = follow(origin, section, parameters(specimen, omega, amplitude)[0])
+    solution, steepness = follow(origin, section, parameters(specimen, omega, amplitude)[0])
     if solution is None:
+        reason = ""
+        if steepness > STEEP:
+            reason = f" (the last orbit found on the way multiplies disturbances by up to {steepness:.2g} per period)"
         raise NoOrbit(
             f"no rocking orbit was found at omega = {omega:g} rad/s, beta = {specimen.beta:g}, amplitude = "
-            f"{amplitude:g} m/s2: provide a closer guess, or values closer to those of a known orbit"
+            f"{amplitude:g} m/s2{reason}: provide a closer guess, or values closer to those of a known orbit"
         )
     return solution
 
