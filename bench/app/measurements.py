@@ -65,7 +65,8 @@ class Quantity(NDArrayOperatorsMixin):
         return float(self.values)
 
     def __repr__(self) -> str:
-        return f"{np.array2string(self.values, precision=6, threshold=20, separator=', ')} {self.unit}".rstrip()
+        unit = "" if self.unit == "1" else self.unit
+        return f"{np.array2string(self.values, precision=6, threshold=20, separator=', ')} {unit}".rstrip()
 
 
 @dataclass(frozen=True, eq=False, repr=False)

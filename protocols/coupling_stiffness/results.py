@@ -122,7 +122,7 @@ def _draw_decay(panel: "Axes", below: "Axes", spring: SpringResult) -> None:
     panel.legend(loc="upper right", fontsize=7, ncols=2)
     below.set_xlabel("time [s]")
     below.set_ylabel("residual [µm]")
-    found = plus_minus(spring.k_c, COVERAGE * spring.uncertainty)
+    found = plus_minus(spring.k_c, COVERAGE * spring.uncertainty, sign="±")
     panel.set_title(rf"$\beta$ = {spring.label:g} on the label: $k_C$ = {found} N/m (k = 2)", loc="left", fontsize=8)
     set_grid(panel)
     set_grid(below)

@@ -10,7 +10,19 @@ import numpy as np
 from bench.analysis.free_decay.response import OMEGA1, XI1
 from bench.analysis.gain import COVERAGE
 from bench.analysis.uncertainty import plus_minus
-from bench.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILLION, new_figure, set_grid
+from bench.figures.style import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    PURPLE,
+    SKY,
+    VERMILLION,
+    new_figure,
+    set_grid,
+    ticks_1_2_5,
+)
 from bench.figures.text_table import TextColumn, text_table
 from protocols.common.decays.frame import FrameResult
 from protocols.common.decays.parameters import DecayPoint
@@ -143,6 +155,7 @@ def _draw_spectrum(panel: "Axes", result: FrameResult) -> None:
     for mode, omega in enumerate(result.frame.values[OMEGA1:]):
         name = "modes" if mode == 0 else None
         panel.axvline(omega / (2.0 * np.pi), color=BLACK, linewidth=0.7, linestyle=":", label=name)
+    ticks_1_2_5(panel.yaxis)
     panel.legend(loc="lower left", fontsize=7)
     panel.set_xlabel("frequency [Hz]")
     panel.set_ylabel("residual [µm/√Hz]")
@@ -180,5 +193,5 @@ def _draw_damping(panel: "Axes", result: FrameResult, mode: int) -> None:
     panel.set_xlabel(f"drift in mode {mode + 1} [mm]")
     panel.set_ylabel(rf"$\xi_{mode + 1}$ [%]")
     verdict = "significant" if result.nonlinear[mode] else "not significant"
-    text = plus_minus(slope, COVERAGE * uncertainty)
+    text = plus_minus(slope, COVERAGE * uncertainty, sign="±")
     panel.set_title(f"slope {text} %/mm (k = 2), {verdict} (99 %)", loc="left", fontsize=8)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bench.figures.style import BLUE, GREY, MILLI, VERMILLION, new_figure, set_grid
+from bench.figures.style import BLUE, GREY, MILLI, VERMILLION, new_figure, set_grid, ticks_1_2_5
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -25,6 +25,7 @@ def hold_figure(cycles: Mapping[str, Sequence[Any]], omega: float, beta: float) 
     figure = new_figure(WIDTH, HEIGHT)
     above, below = figure.add_subplot(2, 1, 1), figure.add_subplot(2, 1, 2)
     above.semilogy(number, MILLI * drift, "o", color=BLUE, markersize=2.5)
+    ticks_1_2_5(above.yaxis)
     above.set_ylabel("peak drift  [mm]")
     above.set_title(rf"$\Omega$ = {omega:g} rad/s,  $\beta$ = {beta:g}", loc="left", fontsize=9)
     # a logarithmic axis has no zero, so cycles without control are not drawn

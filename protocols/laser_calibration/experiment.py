@@ -16,7 +16,7 @@ from bench.control.oscillator import Segment, program
 from bench.datafile.tables import Column, Table
 from bench.engine.steps import OperatorAction, Outcome, Publish, Step
 from bench.events import PointFinished
-from bench.figures.style import BLACK, BLUE, GREY, new_figure, set_grid, write_figure
+from bench.figures.style import BLACK, BLUE, GREY, new_figure, set_grid, ticks_1_2_5, write_figure
 from bench.figures.text_table import TextColumn, text_table
 from bench.findings import FitFinished, FittedParameter, Series
 from bench.preflight.demands import demands_of, load, response_of
@@ -241,6 +241,7 @@ def _errors_figure(curves: tuple[ErrorCurve, ErrorCurve] | None) -> "Figure":
         over.plot(reading, 1e6 * (error - error.mean()), color=BLUE)
         tried = np.arange(1, curve.scores.size + 1)
         orders.semilogy(tried, 1e6 * curve.scores, "o-", color=BLACK, markersize=4)
+        ticks_1_2_5(orders.yaxis)
         orders.axvline(curve.error.size - 1, color=BLUE)
     return figure
 

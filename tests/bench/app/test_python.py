@@ -177,6 +177,7 @@ def test_a_quantity_is_an_array_with_a_unit() -> None:
     assert (given > 0).tolist() == [True, False]
     assert (given[1].unit, float(given[1])) == ("m", -2.0)
     assert repr(given) == "[ 1., -2.] m"
+    assert str(bench.Quantity(np.array(0.25), "1")) == "0.25"
 
 
 @dataclass
