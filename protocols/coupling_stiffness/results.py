@@ -89,7 +89,7 @@ def _draw_compared(panel: "Axes", springs: Sequence[SpringResult]) -> None:
     panel.errorbar(labels, 100.0 * (mounted / labels - 1.0), 100.0 * expanded / labels, fmt="o", ms=4, color=BLUE)
     panel.axhline(0.0, color=BLACK, linewidth=0.8)
     panel.set_xlabel(r"$\beta$ on the label [1]")
-    panel.set_ylabel(r"$\beta$ as mounted, deviation from the label [%]")
+    panel.set_ylabel("deviation of $\\beta$\nfrom the label [%]")
 
 
 def _draw_budget(panel: "Axes", springs: Sequence[SpringResult]) -> None:
