@@ -103,9 +103,15 @@ def _decoded(kind: Kind, optional: bool, values: NDArray[Any]) -> list[Any]:
 def field_of(name: str, stored: hdf5.Dataset) -> Field:
     """The field that a dataset stores."""
     with reading(stored.name):
-        attrs = stored.attrs
-        unit, description = str(attrs.get("units", "")), str(attrs["description"])
-        return Field(name, Kind(attrs["kind"]), unit, description, bool(attrs["optional"]))
+        about = hdf5.attributes(stored)
+        unit, description = str(about.get("units", "")), str(about["description"])
+        return Field(name, Kind(about["kind"]), unit, description, bool(about["optional"]))
+
+
+def values_of(field: Field, stored: hdf5.Dataset) -> list[Any]:
+    """The values of a field that `field_of` has read from its dataset; absent values are None."""
+    with reading(stored.name):
+        return _decoded(field.kind, field.optional, _read(stored))
 
 
 def fields_from(declared: Any) -> tuple[Field, ...]:

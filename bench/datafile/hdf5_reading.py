@@ -249,7 +249,7 @@ def _member(parent: Group, path: str, kind: type) -> object:
     name = f"{parent.name.rstrip('/')}/{path.lstrip('/')}"
     with reading(name):
         try:
-            found = parent[path]
+            found = stored_member(parent, path)
         except KeyError:
             if path in parent:
                 raise

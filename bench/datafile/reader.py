@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from bench.datafile import checksums, hdf5, tables
 from bench.datafile.checksums import SMALL, Integrity, integrity
 from bench.datafile.declared import FIXED_GROUPS, TABLES, event_table, path_of
-from bench.datafile.fields import Field, decode, field_of
+from bench.datafile.fields import Field, field_of, values_of
 from bench.datafile.findings_tables import FINDING_TABLES, last_findings, read_fits
 from bench.datafile.hdf5_reading import UNREADABLE, DataFileError, reading, reason
 from bench.datafile.opening import columns_from, open_file
@@ -202,6 +202,11 @@ class DataFile(SampleReader):
         table = event_table(event)
         return {} if table is None else {field.name: values for field, values in self.growing(table.path).items()}
 
+    def has_table_of(self, event: type[Event]) -> bool:
+        """Whether the file has a table of this kind of event."""
+        table = event_table(event)
+        return table is not None and hdf5.has(self._entry, table.path)
+
     def rows_of(self, event: type[Event]) -> list[dict[str, Any]]:
         """The columns of `columns_of` as one dict per row."""
         return as_rows(self.columns_of(event))
@@ -225,7 +230,8 @@ class DataFile(SampleReader):
             return {}
         group = hdf5.group(self._entry, path)
         stored = {name: hdf5.dataset(group, name) for name in hdf5.names(group)}
-        columns = {field_of(name, each): decode(each) for name, each in stored.items()}
+        fields = {field_of(name, each): each for name, each in stored.items()}
+        columns = {field: values_of(field, each) for field, each in fields.items()}
         whole = min([self._complete(path.rpartition("/")[2]), *(len(values) for values in columns.values())])
         return {field: values[:whole] for field, values in columns.items()}
 

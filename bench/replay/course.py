@@ -68,8 +68,9 @@ class RecordedCourse:
         """Whether the uncertainties in the file can be compared with those of this version."""
         self._rows = {kind.__name__: as_rows(columns) for kind in ENTRY_TABLES if (columns := record.columns_of(kind))}
         entries = self._entries()
-        members = record.columns_of(TwinEstimate).get("members", ())
-        self.twin_in_time = len({*members}) <= 1 and not any(each.columns.get("realtime") for each in entries)
+        self._own: dict[str, list[Row]] = {}
+        members = {row["members"] for row in self.rows_of(TwinEstimate.table) or () if "members" in row}
+        self.twin_in_time = len(members) <= 1 and not any(each.columns.get("realtime") for each in entries)
         """Whether the live model kept up with the samples. If it did not, the estimates of the replay differ, because a
         replay waits for its live model.
         """
@@ -89,8 +90,12 @@ class RecordedCourse:
         for kind, table in ENTRY_TABLES.items():
             if table.path == path:
                 return self._rows.get(kind.__name__)
-        columns = self._record.growing(path)
-        return as_rows({field.name: values for field, values in columns.items()}) if columns else None
+        if path not in self._own:
+            columns = self._record.growing(path)
+            if not columns:
+                return None
+            self._own[path] = as_rows({field.name: values for field, values in columns.items()})
+        return self._own[path]
 
     @property
     def first_warnings(self) -> list[str]:

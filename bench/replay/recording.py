@@ -154,6 +154,6 @@ def _configuration(record: DataFile) -> BenchConfiguration:
         allowed = "this version cannot read the recorded configuration: replay the file with the version that wrote it"
         raise InvalidInput("record", record.title, allowed) from error
     # files of versions without a live model have no table of its estimates
-    if record.columns_of(TwinEstimate):
+    if record.has_table_of(TwinEstimate):
         return configuration
     return configuration.model_copy(update={"twin": Twin(enabled=False)})
