@@ -1,8 +1,11 @@
-"""Versions of the software that produced a result."""
+"""Versions of the software that produced a result, determined once in a process: later changes concern code that the
+process has not loaded.
+"""
 
 import json
 import platform
 import subprocess
+from functools import cache
 from importlib.metadata import PackageNotFoundError, distribution, version
 from pathlib import Path
 
@@ -13,6 +16,7 @@ def software() -> dict[str, str]:
     return found | {name: _version(name) for name in ("numpy", "scipy", "numba", "h5py")}
 
 
+@cache
 def revision() -> str:
     """Git hash of this program, followed by "+" if there are uncommitted changes. Outside a repository it is the hash
     from which the program was installed, or "unknown".
@@ -43,6 +47,7 @@ def _installed_revision() -> str:
     return str(noted.get("vcs_info", {}).get("commit_id", "unknown"))
 
 
+@cache
 def _version(name: str) -> str:
     try:
         return version(name)
