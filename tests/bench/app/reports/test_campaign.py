@@ -1,22 +1,22 @@
 """The report of a campaign from its file: a short harmonic run on the simulated bench, and files that are refused."""
 
 import json
-from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from pypdfium2 import PdfDocument
 
 from bench.analysis.signals import SignalMap
-from bench.app.catalogue import load_protocol
 from bench.app.cli.main import main
+from bench.app.reports import report
 from bench.app.reports.report import campaign_report
 from bench.datafile.reader import open_datafile
 from bench.document import gain_map
 from bench.document.campaign import Campaign
 from bench.document.document import Document, Picture, Section, Table
-from protocols.harmonic.protocol import HarmonicParameters
 from protocols.harmonic.report_cycles import PERIODS, SAMPLES, Dwells
 from sim.gain import predict_gain
 
@@ -37,12 +37,37 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "campaign.h5"
 
 
+@dataclass(frozen=True)
+class Reported:
+    """The document of the command, and its two files; something else was in `html` before."""
+
+    document: Document
+    html: Path
+    pdf: Path
+
+
 @pytest.fixture(scope="module")
-def document(file: Path) -> Iterator[Document]:
-    with pytest.MonkeyPatch.context() as patch, open_datafile(file) as record:
+def reported(file: Path, tmp_path_factory: pytest.TempPathFactory) -> Reported:
+    folder, made = tmp_path_factory.mktemp("report"), list[Document]()
+    html, pdf = folder / "a.html", folder / "a.pdf"
+    html.write_text("precious", encoding="utf-8")
+
+    def kept(*given: Any) -> Document:
+        made.append(campaign_report(*given))
+        return made[-1]
+
+    with pytest.MonkeyPatch.context() as patch:
         patch.setattr(gain_map, "STEP", 1.0)
         patch.setattr(gain_map, "BETA_STEP", 0.2)
-        yield campaign_report(Campaign(file, record, HarmonicParameters), load_protocol("harmonic"))
+        patch.setattr(report, "campaign_report", kept)
+        assert main(["report", str(file), "--html", str(html), "--pdf", str(pdf), "--overwrite"]) == 0
+    (document,) = made
+    return Reported(document, html, pdf)
+
+
+@pytest.fixture(scope="module")
+def document(reported: Reported) -> Document:
+    return reported.document
 
 
 def section(document: Document, key: str) -> Section:
@@ -142,20 +167,17 @@ def test_limits_and_provenance_name_file_hash_versions_and_seed(document: Docume
     assert any("guard" in caption for caption in captions)
 
 
-def test_the_command_writes_both_forms_and_overwrites_only_when_asked(
-    file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(gain_map, "STEP", 1.0)
-    monkeypatch.setattr(gain_map, "BETA_STEP", 0.2)
+def test_the_command_overwrites_only_when_asked(file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     html, pdf = tmp_path / "a.html", tmp_path / "a.pdf"
     html.write_text("precious", encoding="utf-8")
-    arguments = ["report", str(file), "--html", str(html), "--pdf", str(pdf)]
-    assert main(arguments) == 2
+    assert main(["report", str(file), "--html", str(html), "--pdf", str(pdf)]) == 2
     assert "--overwrite" in capsys.readouterr().err
     assert html.read_text(encoding="utf-8") == "precious"
     assert not pdf.exists()
-    assert main([*arguments, "--overwrite"]) == 0
-    text = html.read_text(encoding="utf-8")
+
+
+def test_the_command_writes_both_forms(reported: Reported) -> None:
+    text = reported.html.read_text(encoding="utf-8")
     assert text.startswith("<!DOCTYPE html>")
     assert text.count("<svg ") == 5
     # what a person noted is text, in the summary and in the provenance
@@ -163,11 +185,11 @@ def test_the_command_writes_both_forms_and_overwrites_only_when_asked(
     assert "<b>Ann" not in text
     assert text.count("&lt;script&gt;alert(1)&lt;/script&gt; 5 % &amp; #[x]") == 2
     # five figures and a dozen tables
-    with PdfDocument(pdf) as printed:
+    with PdfDocument(reported.pdf) as printed:
         assert len(printed) >= 5
         whole = "".join(page.get_textpage().get_text_range() for page in printed)
         assert "".join(whole.split()).count("".join(NOTE.split())) == 2
-    assert [path.name for path in sorted(tmp_path.iterdir())] == ["a.html", "a.pdf"]
+    assert [path.name for path in sorted(reported.html.parent.iterdir())] == ["a.html", "a.pdf"]
 
 
 @pytest.mark.parametrize(
