@@ -79,9 +79,13 @@ KERNELS = (
 )
 """Modules that compile all of the kernel when they are imported, divided between two processors."""
 
+WINDOW = Path(__file__).parents[1] / "bench" / "app" / "gui" / "__pycache__"
+"""Bytecode that is there if all tests were collected before; otherwise each process would compile that of the
+libraries, the program and the tests, which takes longer than to import them."""
+
 
 def pytest_configure(config: pytest.Config) -> None:
-    """The kernel is compiled once, before several processes want it."""
+    """The kernel, and in a new environment the bytecode, is compiled once, before several processes want it."""
     if hasattr(config, "workerinput") or not config.getoption("numprocesses", 0) or config.option.collectonly:
         return
     compiling = [
@@ -89,6 +93,9 @@ def pytest_configure(config: pytest.Config) -> None:
     ]
     for process in compiling:
         process.wait()
+    if config.args_source is pytest.Config.ArgsSource.TESTPATHS and not WINDOW.exists():
+        collecting = [sys.executable, "-m", "pytest", "--collect-only", "-q", "-n", "0"]
+        subprocess.run(collecting, cwd=config.rootpath, stdout=subprocess.DEVNULL, check=False)
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
@@ -125,6 +132,8 @@ def pytest_collection_finish() -> None:
     """What is there when the first test begins stays until the end: the garbage collector need not look at it."""
     gc.collect()
     gc.freeze()
+    # as in later versions of Python
+    gc.set_threshold(2_000, 10, 10)
 
 
 @pytest.hookimpl(optionalhook=True)
