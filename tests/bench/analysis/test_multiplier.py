@@ -86,17 +86,11 @@ def spiral(multiplier: complex, cycles: int, first: float, noise: float, seed: i
     return series + noise * rng.standard_normal((cycles, 12)) @ mixing
 
 
-@pytest.mark.parametrize(
-    ("modulus", "degrees", "cycles", "first"),
-    [(1.0464, 165.4, 55, 0.02), (1.009, 156.0, 120, 0.02), (0.97, 134.9, 60, 0.1), (0.999, 90.0, 24, 0.02)],
-)
-@pytest.mark.parametrize(("seeds", "least"), [(20, 16), pytest.param(100, 89, marks=pytest.mark.soak)])
-def test_intervals_cover_the_truth(
-    modulus: float, degrees: float, cycles: int, first: float, seeds: int, least: int
-) -> None:
-    """95 % of the seeds are expected within the expanded uncertainty, and at least `least` with a probability of 0.996
-    for 100 seeds and 0.997 for 20.
-    """
+SPIRALS = [(1.0464, 165.4, 55, 0.02), (1.009, 156.0, 120, 0.02), (0.97, 134.9, 60, 0.1), (0.999, 90.0, 24, 0.02)]
+
+
+def covered(modulus: float, degrees: float, cycles: int, first: float, seeds: int) -> Array:
+    """Numbers of seeds with the modulus and with the angle within the expanded uncertainty."""
     truth = modulus * np.exp(1j * np.radians(degrees))
     inside = np.zeros(2)
     for seed in range(seeds):
@@ -106,16 +100,32 @@ def test_intervals_cover_the_truth(
         assert abs(found.angle - np.radians(degrees)) < np.radians(1.0)
         inside[0] += abs(found.modulus - modulus) <= 2.0 * found.modulus_uncertainty
         inside[1] += abs(found.angle - np.radians(degrees)) <= 2.0 * found.angle_uncertainty
-    assert inside.min() >= least
+    return inside
 
 
-def test_noise_does_not_reduce_the_modulus() -> None:
-    """A regression of each cycle on its predecessor is biased towards zero; the joint fit is not."""
+def test_intervals_cover_the_truth() -> None:
+    """95 % of all are expected within the expanded uncertainty, and at least 26 of 32 with a probability of 0.999."""
+    inside = sum(covered(*each, seeds=8) for each in SPIRALS)
+    assert np.min(inside) >= 26
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize(("modulus", "degrees", "cycles", "first"), SPIRALS)
+def test_intervals_of_every_motion_cover_the_truth(modulus: float, degrees: float, cycles: int, first: float) -> None:
+    """At least 89 of 100 with a probability of 0.996."""
+    assert covered(modulus, degrees, cycles, first, seeds=100).min() >= 89
+
+
+@pytest.mark.parametrize(("seeds", "most"), [(16, 3.3), pytest.param(40, 3.0, marks=pytest.mark.soak)])
+def test_noise_does_not_reduce_the_modulus(seeds: int, most: float) -> None:
+    """A regression of each cycle on its predecessor is biased towards zero; the joint fit is not: its mean error is
+    within `most` standard uncertainties with a probability of 0.995, by Student's t.
+    """
     truth = 1.0 * np.exp(2.8j)
-    found = [dominant_multiplier(spiral(truth, 60, 0.02, 3e-3, seed)) for seed in range(40)]
+    found = [dominant_multiplier(spiral(truth, 60, 0.02, 3e-3, seed)) for seed in range(seeds)]
     errors = [each.modulus - 1.0 for each in found if each is not None]
-    assert len(errors) == 40
-    assert abs(np.mean(errors)) < 3.0 * np.std(errors) / np.sqrt(40.0)
+    assert len(errors) == seeds
+    assert abs(np.mean(errors)) < most * np.std(errors, ddof=1) / np.sqrt(seeds)
     series = spiral(truth, 60, 0.02, 3e-3, 0)
     moved = series - series.mean(axis=0)
     axes = np.linalg.svd(moved, full_matrices=False)[2][:2].T
@@ -134,7 +144,7 @@ def test_a_second_pair_is_separated_from_the_dominant_one() -> None:
 
 def test_noise_alone_has_no_multiplier() -> None:
     rng = np.random.default_rng(5)
-    assert not any(dominant_multiplier(1.0 + 1e-3 * rng.standard_normal((60, 12))) for _ in range(20))
+    assert not any(dominant_multiplier(1.0 + 1e-3 * rng.standard_normal((60, 12))) for _ in range(8))
 
 
 def test_a_series_that_is_short_constant_or_not_finite() -> None:
