@@ -160,8 +160,8 @@ def test_limits_and_provenance_name_file_hash_versions_and_seed(document: Docume
     assert facts["seed of the simulation"] == "7"
     assert "numba" in facts["libraries when recorded"]
     rows = {row[1]: row for row in tables(document, "provenance")[1].rows}
-    assert rows["omega"][2:] == ["20", "rad/s"]
-    assert rows["settle_limit"][2:] == ["240", "s"]
+    assert rows["--omega"][2:] == ["20", "rad/s"]
+    assert rows["--settle-limit"][2:] == ["240", "s"]
     captions = [table.caption for table in tables(document, "limits")]
     assert any("preflight" in caption for caption in captions)
     assert any("guard" in caption for caption in captions)
