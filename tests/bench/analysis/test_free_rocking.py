@@ -133,18 +133,12 @@ def test_a_trend_is_found_where_there_is_one(trend: float) -> None:
     assert (abs(result.value) > 5.0 * result.uncertainty) is (trend > 0.0)
 
 
-@pytest.mark.parametrize(
-    ("recordings", "least", "most"), [(16, 0.5, 1.57), pytest.param(24, 0.6, 1.45, marks=pytest.mark.soak)]
-)
-def test_stated_uncertainties_are_those_of_repetition(recordings: int, least: float, most: float) -> None:
-    """Noise and the steps of a laser's output, filtered together: errors of the recordings against what each says.
-
-    The bounds are those of the root of chi2 over the number of recordings, between its 0.1 % and 99.9 %.
-    """
+def test_stated_uncertainties_are_those_of_repetition() -> None:
+    """Noise and the steps of a laser's output, filtered together: errors of 24 recordings against what each says."""
     true = motion(0.5)
     card = signal.butter(4, 100.0, fs=RATE, output="sos")
     errors, stated = [], []
-    for seed in range(recordings):
+    for seed in range(24):
         start = replace(true, start=2.5 + 0.01 * seed)
         seen = recording(start, Shown(noise=5e-6, step=4.9e-5), seed)
         started = signal.sosfilt_zi(card) * seen.displacement[0]
@@ -155,7 +149,8 @@ def test_stated_uncertainties_are_those_of_repetition(recordings: int, least: fl
         errors.append([values[R] - true.restitution, values[P] - P_TRUE, relation.restitution - true.restitution])
         stated.append([spread[R], spread[P], relation.uncertainty])
     ratio = np.sqrt(np.mean(np.square(errors), axis=0) / np.mean(np.square(stated), axis=0))
-    assert np.all((ratio > least) & (ratio < most)), ratio
+    # of 24, the ratio scatters by 15 %
+    assert np.all((ratio > 0.6) & (ratio < 1.45)), ratio
 
 
 def test_errors_of_the_laser_are_carried_as_large_as_they_are() -> None:
