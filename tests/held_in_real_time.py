@@ -1,0 +1,70 @@
+"""Unstable orbits held in real time: the real drivers against the emulated laboratory, then every file replayed.
+
+    python -m tests.held_in_real_time [serial | socket | analogue]
+
+Both unstable points of the paper's campaign, one run each, with the lasers connected as named (default: serial). Each
+must be held with the predicted gain, and its file must replay bit for bit. Ten minutes, nearly all of it bench time.
+Block and lead must together be shorter than a cycle (0.419 s at 15 rad/s), so the lead is 0.3 s: a computer that keeps
+the program from running for longer than that ends the run by an underflow.
+"""
+
+import json
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+from bench.config.model import BenchConfiguration
+from bench.config.template import as_toml
+from tests.emulated import emulated
+
+POINTS = ((12.5, 0.64), (15.0, 0.97))
+"""Frequency [rad/s] and stiffness ratio."""
+LEAD = 0.3
+QUICK = ("--settle-limit", "30", "--ramp-time", "4", "--harmonics", "5", "--starts", "2")
+
+
+def program(*arguments: str) -> tuple[int, dict[str, Any]]:
+    """Exit code of `rockbench` with these arguments, and what it printed as JSON; its log is passed on."""
+    command = [sys.executable, "-m", "bench", *arguments, "--json"]
+    done = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=False)
+    return done.returncode, json.loads(done.stdout or "{}")
+
+
+def led(configuration: BenchConfiguration) -> BenchConfiguration:
+    """The same bench with a lead that leaves a correction in time."""
+    acquisition = configuration.acquisition.model_copy(update={"lead": LEAD})
+    return configuration.model_copy(update={"acquisition": acquisition})
+
+
+def held(file: Path, omega: float, beta: float, out: Path) -> bool:
+    """Hold one point and replay its file; prints both."""
+    begun = time.monotonic()
+    point = ("--omega", f"{omega:g}", "--beta", f"{beta:g}")
+    code, result = program("run", "harmonic", "--config", str(file), "--yes", "--out", str(out), *point, *QUICK)
+    print(f"omega {omega:g} rad/s, beta {beta:g}: exit code {code} after {time.monotonic() - begun:.0f} s")
+    found = next(iter(result.get("points", ())), None)
+    if found is None:
+        print(f"  no point: {result.get('reason') or result.get('error')}")
+        return False
+    print(f"  {found['status']}: alpha_2 {found['alpha_2']:.4f}, predicted {found['alpha_2_predicted']:.4f}")
+    print(f"  {found['reason']}")
+    _, replayed = program("replay", str(out / "campaign.h5"))
+    print(f"  replayed bit for bit: {replayed.get('identical')} {replayed.get('differences', replayed)}", flush=True)
+    return code == 0 and found["status"] == "held" and found["agrees"] is True and replayed.get("identical") is True
+
+
+def main(arguments: list[str]) -> int:
+    """Return 0 if every point is held, agrees with its prediction and replays bit for bit."""
+    lasers = ("--lasers", arguments[0]) if arguments else ()
+    with emulated(*lasers, shown=True) as configuration, tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "bench.toml"
+        file.write_text(as_toml(led(configuration)), encoding="utf-8")
+        every = [held(file, *point, Path(folder) / f"run_{n}") for n, point in enumerate(POINTS)]
+    return 0 if all(every) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
