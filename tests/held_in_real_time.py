@@ -13,6 +13,8 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -39,29 +41,41 @@ def led(configuration: BenchConfiguration) -> BenchConfiguration:
     return configuration.model_copy(update={"acquisition": acquisition})
 
 
+def options(omega: float, beta: float) -> tuple[str, ...]:
+    """Options of the run of one point."""
+    return ("--omega", f"{omega:g}", "--beta", f"{beta:g}", *QUICK)
+
+
+@contextmanager
+def laboratory(lasers: Sequence[str]) -> Iterator[Path]:
+    """An emulated laboratory, and the file of its configuration."""
+    with emulated(*lasers, shown=True) as configuration, tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "bench.toml"
+        file.write_text(as_toml(led(configuration)), encoding="utf-8")
+        yield file
+
+
 def held(file: Path, omega: float, beta: float, out: Path) -> bool:
     """Hold one point and replay its file; prints both."""
     begun = time.monotonic()
-    point = ("--omega", f"{omega:g}", "--beta", f"{beta:g}")
-    code, result = program("run", "harmonic", "--config", str(file), "--yes", "--out", str(out), *point, *QUICK)
+    code, result = program("run", "harmonic", "--config", str(file), "--yes", "--out", str(out), *options(omega, beta))
     print(f"omega {omega:g} rad/s, beta {beta:g}: exit code {code} after {time.monotonic() - begun:.0f} s")
     found = next(iter(result.get("points", ())), None)
     if found is None:
-        print(f"  no point: {result.get('reason') or result.get('error')}")
-        return False
-    print(f"  {found['status']}: alpha_2 {found['alpha_2']:.4f}, predicted {found['alpha_2_predicted']:.4f}")
-    print(f"  {found['reason']}")
+        print(f"  no point: {result}")
+    else:
+        print(f"  {found['status']}: alpha_2 {found['alpha_2']:.4f}, predicted {found['alpha_2_predicted']:.4f}")
+        print(f"  {found['reason']}")
     _, replayed = program("replay", str(out / "campaign.h5"))
-    print(f"  replayed bit for bit: {replayed.get('identical')} {replayed.get('differences', replayed)}", flush=True)
-    return code == 0 and found["status"] == "held" and found["agrees"] is True and replayed.get("identical") is True
+    print(f"  replayed bit for bit: {replayed.get('identical')}; {replayed.get('differences', replayed)}", flush=True)
+    good = found is not None and found["status"] == "held" and found["agrees"] is True
+    return good and code == 0 and replayed.get("identical") is True
 
 
 def main(arguments: list[str]) -> int:
     """Return 0 if every point is held, agrees with its prediction and replays bit for bit."""
     lasers = ("--lasers", arguments[0]) if arguments else ()
-    with emulated(*lasers, shown=True) as configuration, tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "bench.toml"
-        file.write_text(as_toml(led(configuration)), encoding="utf-8")
+    with laboratory(lasers) as file, tempfile.TemporaryDirectory() as folder:
         every = [held(file, *point, Path(folder) / f"run_{n}") for n, point in enumerate(POINTS)]
     return 0 if all(every) else 1
 

@@ -230,7 +230,7 @@ def _change(ratio: complex, omega: float) -> str:
     gain, phase = abs(ratio), float(np.angle(ratio))
     text = (
         f"the table's response to the drive changed: gain by a factor of {gain:.2f}, "
-        f"phase by {np.degrees(phase):+.0f} degrees"
+        f"phase by {round(np.degrees(phase)):+d} degrees"
     )
     if phase < -abs(gain - 1.0):
         text += f", like a delay of {-1e3 * phase / omega:.0f} ms"
