@@ -1,11 +1,11 @@
 """Unstable orbits held in real time: the real drivers against the emulated laboratory, then every file replayed.
 
-    python -m tests.held_in_real_time [serial | socket | analogue]
+    python -m tests.held_in_real_time [--lasers analogue] [--sample-rate 1000]
 
-Both unstable points of the paper's campaign, one run each, with the lasers connected as named (default: serial). Each
+Both unstable points of the paper's campaign, one run each; the arguments are those of `rockbench emulate`. Each point
 must be held with the predicted gain, and its file must replay bit for bit. Ten minutes, nearly all of it bench time.
-Block and lead must together be shorter than a cycle (0.419 s at 15 rad/s), so the lead is 0.3 s: a computer that keeps
-the program from running for longer than that ends the run by an underflow.
+Block and lead must together be shorter than a cycle, 0.419 s at 15 rad/s: where the computer keeps program or
+laboratory from running for longer than the lead, the drive underflows and the run has failed.
 """
 
 import json
@@ -24,7 +24,8 @@ from tests.emulated import emulated
 
 POINTS = ((12.5, 0.64), (15.0, 0.97))
 """Frequency [rad/s] and stiffness ratio."""
-LEAD = 0.3
+BLOCK, LEAD = 0.05, 0.35
+"""Duration of a block and lead of the drive [s]."""
 QUICK = ("--settle-limit", "30", "--ramp-time", "4", "--harmonics", "5", "--starts", "2")
 
 
@@ -35,9 +36,9 @@ def program(*arguments: str) -> tuple[int, dict[str, Any]]:
     return done.returncode, json.loads(done.stdout or "{}")
 
 
-def led(configuration: BenchConfiguration) -> BenchConfiguration:
-    """The same bench with a lead that leaves a correction in time."""
-    acquisition = configuration.acquisition.model_copy(update={"lead": LEAD})
+def timed(configuration: BenchConfiguration) -> BenchConfiguration:
+    """The same bench with corrections in time."""
+    acquisition = configuration.acquisition.model_copy(update={"block_duration": BLOCK, "lead": LEAD})
     return configuration.model_copy(update={"acquisition": acquisition})
 
 
@@ -47,11 +48,11 @@ def options(omega: float, beta: float) -> tuple[str, ...]:
 
 
 @contextmanager
-def laboratory(lasers: Sequence[str]) -> Iterator[Path]:
+def laboratory(arguments: Sequence[str]) -> Iterator[Path]:
     """An emulated laboratory, and the file of its configuration."""
-    with emulated(*lasers, shown=True) as configuration, tempfile.TemporaryDirectory() as folder:
+    with emulated(*arguments, shown=True) as configuration, tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "bench.toml"
-        file.write_text(as_toml(led(configuration)), encoding="utf-8")
+        file.write_text(as_toml(timed(configuration)), encoding="utf-8")
         yield file
 
 
@@ -74,8 +75,7 @@ def held(file: Path, omega: float, beta: float, out: Path) -> bool:
 
 def main(arguments: list[str]) -> int:
     """Return 0 if every point is held, agrees with its prediction and replays bit for bit."""
-    lasers = ("--lasers", arguments[0]) if arguments else ()
-    with laboratory(lasers) as file, tempfile.TemporaryDirectory() as folder:
+    with laboratory(arguments) as file, tempfile.TemporaryDirectory() as folder:
         every = [held(file, *point, Path(folder) / f"run_{n}") for n, point in enumerate(POINTS)]
     return 0 if all(every) else 1
 
