@@ -3,6 +3,7 @@
 import json
 import tomllib
 from collections.abc import Generator, Iterator
+from importlib import import_module
 from math import pi
 from pathlib import Path
 from types import SimpleNamespace
@@ -136,6 +137,21 @@ def test_it_is_run_replayed_and_reported(file: Path, tmp_path: Path, capsys: Sai
     assert "Bit-identical to the file" in capsys.readouterr().out
     assert main([*run, "--seed", "3", "--out", str(tmp_path / "seed")]) == 2
     assert "--seed = '3' is refused: the backend linear-table has no seed" in capsys.readouterr().err
+
+
+def test_a_rig_that_adds_the_delays_of_its_inputs_to_the_lead_is_replayed(
+    file: Path, tmp_path: Path, capsys: Said, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = import_module("linear_table").LinearTableRig
+    monkeypatch.setattr("linear_table.LinearTableRig", lambda settings, lead, clock: made(settings, lead + 7, clock))
+    out = tmp_path / "run"
+    assert main(["run", "tone-sweep", "--omega", "40", "--config", str(file), "--out", str(out)]) == 0
+    with open_datafile(out / "campaign.h5") as record:
+        configuration = BenchConfiguration.model_validate_json(record.metadata["configuration"])
+        assert int(record.metadata["lead"]) == configuration.lead_samples + 7
+    capsys.readouterr()
+    assert main(["replay", str(out / "campaign.h5")]) == 0
+    assert "Bit-identical to the file" in capsys.readouterr().out
 
 
 @pytest.mark.usefixtures("plugged")

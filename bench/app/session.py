@@ -111,7 +111,7 @@ def run_session(
             sample_rate=rig.sample_rate,
             point_type=protocol.point,
             events=events,
-            metadata=metadata | {"devices": json.dumps(rig.description)},
+            metadata=metadata | {"devices": json.dumps(rig.description), "lead": str(rig.lead)},
             tables=tables,
             # virtual time does not advance while waiting for the disk
             hold_up=PATIENCE if virtual else 0.0,

@@ -161,6 +161,11 @@ ANSWER = 0.15
 degrees or a gain error of 15 % causes a difference of this size.
 """
 
+CHANGED = 2
+"""Number of successive cycles with such a difference after which the hold ends; during the first one the response may
+still have been the old one for a time, so that it does not show which part has changed.
+"""
+
 GROWTH = 1.5
 """Largest allowed peak of a cycle, relative to the largest peak of the free motion."""
 
@@ -169,10 +174,12 @@ GROWTH = 1.5
 class HoldMonitor:
     """Monitor of a hold: detects the capture of the motion and the reasons to release the hold.
 
-    `patience` is the number of cycles within which the motion must be captured, `largest` [m] the largest allowed peak
-    drift, and `answer` the table's fundamental before the hold, per share of the drive.
+    `omega` [rad/s] is the frequency of the cycles, `patience` the number of cycles within which the motion must be
+    captured, `largest` [m] the largest allowed peak drift, and `answer` the table's fundamental before the hold, per
+    share of the drive.
     """
 
+    omega: float
     authority: float
     patience: int
     largest: float
@@ -180,6 +187,7 @@ class HoldMonitor:
     captured_after: int | None = None
     cycles: int = 0
     _missing: int = 0
+    _changed: int = 0
     _controls: deque[float] = field(default_factory=lambda: deque[float](maxlen=CAPTURED))
 
     def missed(self) -> str | None:
@@ -200,12 +208,9 @@ class HoldMonitor:
         if drift > self.largest:
             return f"the drift reached {1e3 * drift:.3g} mm, but only {1e3 * self.largest:.3g} mm is allowed"
         expected = self.answer * played
-        if abs(achieved - expected) > ANSWER:
-            ratio = achieved / expected
-            return (
-                f"the table's response changed by a factor of {abs(ratio):.2f} and "
-                f"{abs(np.degrees(np.angle(ratio))):.0f} degrees"
-            )
+        self._changed = self._changed + 1 if abs(achieved - expected) > ANSWER else 0
+        if self._changed == CHANGED:
+            return _change(achieved / expected, self.omega)
         controls = list(self._controls)
         if self.captured_after is None:
             if len(controls) == CAPTURED and max(controls) <= QUIET:
@@ -218,3 +223,15 @@ class HoldMonitor:
         if self.captured_after is None and self.cycles >= self.patience:
             return f"the motion was not captured within {self.patience} cycles"
         return None
+
+
+def _change(ratio: complex, omega: float) -> str:
+    """Description of a change of the table's response by the factor `ratio` at `omega` [rad/s]."""
+    gain, phase = abs(ratio), float(np.angle(ratio))
+    text = (
+        f"the table's response to the drive changed: gain by a factor of {gain:.2f}, "
+        f"phase by {round(np.degrees(phase)):+d} degrees"
+    )
+    if phase < -abs(gain - 1.0):
+        text += f", like a delay of {-1e3 * phase / omega:.0f} ms"
+    return text

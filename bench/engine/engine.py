@@ -127,7 +127,7 @@ class Engine:
             case Publish():
                 self._stream.publish(step.event)
             case SetHarmonics():
-                self._sines.set_harmonics(step)
+                return self._sines.set_harmonics(step)
             case Calibrate():
                 self._output.source.oscillator.use(step.calibration)
             case Arm():

@@ -25,6 +25,7 @@ from bench.engine.steps import (
     Play,
     Played,
     RestSamples,
+    Scheduled,
     SetHarmonics,
     Sweep,
 )
@@ -244,12 +245,13 @@ class SineDrive:
             done += self._cycles.push(values[max(self._cycles.first - first, 0) :])
         return Measured(tuple(done))
 
-    def set_harmonics(self, step: SetHarmonics) -> None:
+    def set_harmonics(self, step: SetHarmonics) -> Scheduled:
         """Change the harmonics of the sine."""
         output, wait = self._loop.output, 0
         if step.cycle is not None and self._cycles is not None:
-            wait = max(self._cycles.start_of(step.cycle) - output.begins, 0)
-        output.source.oscillator.trim(step.shares, step.blend, wait)
+            wait = self._cycles.start_of(step.cycle) - output.begins
+        output.source.oscillator.trim(step.shares, step.blend, max(wait, 0))
+        return Scheduled(max(-wait, 0) / self._rate)
 
     def _sample_at(self, phase: float) -> int:
         """Index of the first sample not yet read at which the held sine has `phase` [rad]."""

@@ -87,7 +87,7 @@ class SetHarmonics:
     on, as in `bench.control.oscillator`. A `Sweep` resets them.
 
     The change lasts `blend` cycles. It begins at the start of cycle number `cycle` of the current count, or at once if
-    `cycle` is None or that cycle has begun.
+    `cycle` is None or that cycle has begun. Returns `Scheduled`.
     """
 
     shares: tuple[complex, ...]
@@ -136,6 +136,15 @@ class Done:
     """Outcome of a completed step that has no other result."""
 
 
+@dataclass(frozen=True)
+class Scheduled:
+    """Outcome of a `SetHarmonics`: its change begins `late` seconds after the start of the requested cycle; 0 if in
+    time.
+    """
+
+    late: float
+
+
 @dataclass(frozen=True, eq=False)
 class Fallen:
     """The block has fallen; the drive continues until the plan ramps it out.
@@ -179,6 +188,6 @@ class RestSamples:
     alignments: tuple[Alignment, ...] = ()
 
 
-Outcome = Done | Fallen | Measured | Played | RestSamples
+Outcome = Done | Scheduled | Fallen | Measured | Played | RestSamples
 Plan = Generator[Step, Outcome, object]
 """A plan: yields its steps in order; the engine keeps its return value."""

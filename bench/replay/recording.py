@@ -15,6 +15,7 @@ from bench.config.sections import Twin
 from bench.config.validation import dotted, former_names, with_present_names
 from bench.datafile.reader import DataFile
 from bench.live_values import TwinEstimate
+from drivers.border import LONGEST_LEAD
 from drivers.rig import Channel, Counts
 from sim.errors import InvalidInput
 
@@ -97,8 +98,17 @@ class DataFileRecording:
 
     @property
     def lead(self) -> int:
-        """Number of drive samples queued ahead, from the configuration of the bench."""
-        return self._configuration.lead_samples
+        """Number of drive samples queued ahead: that of the open rig, which may have added delays of its inputs to the
+        configured one. Files of earlier versions contain only the latter.
+        """
+        stored = self._record.metadata.get("lead")
+        if stored is None:
+            return self._configuration.lead_samples
+        longest = round(LONGEST_LEAD * self.sample_rate)
+        if not (stored.isascii() and stored.isdigit() and len(stored) < 10 and int(stored) <= longest):
+            allowed = f"it must be a number of samples from 0 to {longest}; {self._record.title} cannot be replayed"
+            raise InvalidInput("lead", stored, allowed)
+        return int(stored)
 
     @property
     def description(self) -> dict[str, str]:

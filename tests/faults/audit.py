@@ -2,7 +2,7 @@
 
 import shutil
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,10 +17,12 @@ from bench.datafile.reader import DataFile, open_datafile
 from bench.engine.interface import SEVERITY
 from bench.engine.output import TRANSITIONS
 from bench.events import LimitExceeded, State, StateChanged
+from bench.guard.limits import Limits
 from sim.virtual_bench import VirtualBench
 from tests.faults.bench import FaultyBench, Story, released, run
 from tests.faults.fault import Fault
 from tests.faults.places import Place
+from tests.faults.rig import Run
 from tests.faults.setup import LIMITS, RATE
 from tests.patience import LONG
 
@@ -32,7 +34,6 @@ BASE = {None: "completed", "stop": "stopped", "abort": "aborted", "halt": "halte
 """How the run ends without a fault, by what is asked for."""
 RAMPED = ("completed", "stopped", "aborted")
 """Endings in which the enable line is never cut."""
-MOTION = (LIMITS.displacement, LIMITS.velocity, LIMITS.acceleration)
 SMALL_BACKLOG, SHORT_PATIENCE = 8, 0.05
 
 
@@ -75,11 +76,11 @@ def _judged(fault: Fault, place: Place, path: Path | None) -> Verdict:
             broken = [*ending_rules(story, fault, place, noticed), *output_rules(story, fault)]
             if path is not None and fault.disk == "hung" and noticed:
                 with on_disk(path) as record:
-                    broken += [*sample_rules(record, story)]
+                    broken += [*sample_rules(record, bench.rig.runs)]
         broken += [f"a thread is left: {name}" for name in left_since(before)]
     if path is not None:
         with open_datafile(path) as record:
-            broken += [*sample_rules(record, story), *record_rules(record, story, fault)]
+            broken += [*sample_rules(record, bench.rig.runs), *record_rules(record, story, fault)]
     fired = bench.begun and (bool(bench.rig.struck) or not fault.recorded)
     return Verdict(fault.name, place.name, fired, not bench.begun, noticed, story.status, story.reason, tuple(broken))
 
@@ -155,16 +156,9 @@ def output_rules(story: Story, fault: Fault) -> Iterator[str]:
     """What reached the shaker, how the table moved, and that both are at rest."""
     rig = story.bench.rig
     for run_ in rig.runs:
-        drive = run_.drive
-        if np.abs(drive).max(initial=0.0) > LIMITS.drive_voltage or not np.isfinite(drive).all():
-            yield f"{np.abs(drive).max():.3g} V were written"
-        step = np.abs(np.diff(drive, prepend=0.0)).max(initial=0.0) * RATE
-        if step > LIMITS.drive_slew * (1.0 + 1e-9):
-            yield f"the drive changed by {step:.3g} V/s"
+        yield from drive_rules(run_, LIMITS, RATE)
         if not fault.moves:
-            for peak, limit in zip(run_.peaks, MOTION, strict=True):
-                if peak > limit:
-                    yield f"the table reached {peak:.3g} where {limit:g} is allowed"
+            yield from table_rules(run_, LIMITS)
     ramped = rig.runs if story.status in RAMPED else rig.runs[:-1]
     for run_ in ramped:
         if run_.drive[run_.read - 1 :].any():
@@ -178,6 +172,23 @@ def output_rules(story: Story, fault: Fault) -> Iterator[str]:
         yield "the rig is armed after it was closed"
     if rig.runs:
         yield from unrest(rig.inner.bench, within=rig.gain == 1.0)
+
+
+def drive_rules(run_: Run, limits: Limits, rate: float) -> Iterator[str]:
+    """No command beyond the limits, none faster than the slew limit, at `rate` samples per second."""
+    drive = run_.drive
+    if np.abs(drive).max(initial=0.0) > limits.drive_voltage or not np.isfinite(drive).all():
+        yield f"{np.abs(drive).max():.3g} V were written"
+    step = np.abs(np.diff(drive, prepend=0.0)).max(initial=0.0) * rate
+    if step > limits.drive_slew * (1.0 + 1e-9):
+        yield f"the drive changed by {step:.3g} V/s"
+
+
+def table_rules(run_: Run, limits: Limits) -> Iterator[str]:
+    """The true motion of the table within its limits."""
+    for peak, limit in zip(run_.peaks, (limits.displacement, limits.velocity, limits.acceleration), strict=True):
+        if peak > limit:
+            yield f"the table reached {peak:.3g} where {limit:g} is allowed"
 
 
 def unrest(virtual: VirtualBench, *, within: bool = True) -> Iterator[str]:
@@ -199,12 +210,12 @@ def _within(values: NDArray[np.float64], limit: float) -> bool:
     return bool(np.abs(values).max() <= limit)
 
 
-def sample_rules(record: DataFile, story: Story) -> Iterator[str]:
+def sample_rules(record: DataFile, runs: Sequence[Run]) -> Iterator[str]:
     """What is in the file is what was played."""
     blocks, drive = record.blocks, record.drive()
     edges = [*blocks["row"].tolist(), record.rows]
     for start, end, run_, first in zip(edges, edges[1:], blocks["run"], blocks["first"], strict=False):
-        played = story.bench.rig.runs[run_ - 1].drive[first : first + end - start]
+        played = runs[run_ - 1].drive[first : first + end - start]
         if not np.array_equal(drive[start:end], played.astype(np.float32)):
             yield f"the recorded drive of run {run_} from {first} on is not what was played"
 

@@ -70,7 +70,9 @@ class Fault:
 
 def of_samples(name: str, making: Making, status: str, says: str, must: Must, may: bool = False) -> Fault:
     """A fault of what is read, from its beginning on."""
-    return Fault(name, lambda bench: bench.rig.falsify.append(making(bench)), status, says, must, may, recorded=True)
+    return Fault(
+        name, lambda bench: bench.rig.falsify.append(making(bench.rig)), status, says, must, may, recorded=True
+    )
 
 
 def borne(name: str, making: Making) -> Fault:

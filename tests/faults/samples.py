@@ -1,27 +1,24 @@
-"""Ways to falsify the blocks that are read: made for a bench, they turn one block into another."""
+"""Ways to falsify the blocks that are read: made for a rig, they turn one block into another."""
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from drivers.rig import Block, Channel, Counts
-
-if TYPE_CHECKING:
-    from tests.faults.bench import FaultyBench
+from tests.faults.rig import FaultyRig
 
 Change = Callable[[Block], Block]
 """Returns the block itself where there is nothing to change."""
-Making = Callable[["FaultyBench"], Change]
+Making = Callable[[FaultyRig], Change]
 
 
 def _in_counts(change: Callable[[Counts, tuple[Channel, ...]], None]) -> Making:
     """A change of a copy of the counts, shape (n, n_channels), in place."""
 
-    def make(bench: "FaultyBench") -> Change:
+    def make(rig: FaultyRig) -> Change:
         def changed(block: Block) -> Block:
             counts = np.array(block.counts)
-            change(counts, bench.rig.channels)
+            change(counts, rig.channels)
             return Block(block.first, counts)
 
         return changed
@@ -83,9 +80,9 @@ def stuck(*columns: int) -> Making:
         for column in columns:
             counts[:, column] = held.setdefault(column, int(counts[0, column]))
 
-    def make(bench: "FaultyBench") -> Change:
+    def make(rig: FaultyRig) -> Change:
         held.clear()
-        return _in_counts(change)(bench)
+        return _in_counts(change)(rig)
 
     return make
 
@@ -93,8 +90,8 @@ def stuck(*columns: int) -> Making:
 def once(making: Making, after: int = 0) -> Making:
     """In the next block only, which is not among the first `after` of an arming."""
 
-    def make(bench: "FaultyBench") -> Change:
-        change, done = making(bench), False
+    def make(rig: FaultyRig) -> Change:
+        change, done = making(rig), False
 
         def changed(block: Block) -> Block:
             nonlocal done
@@ -110,19 +107,19 @@ def once(making: Making, after: int = 0) -> Making:
 
 def shifted(samples: int) -> Making:
     """Blocks that say that they begin elsewhere."""
-    return lambda _bench: lambda block: Block(block.first + samples, block.counts)
+    return lambda _rig: lambda block: Block(block.first + samples, block.counts)
 
 
 def shortened(samples: int) -> Making:
     """Blocks that lack their last samples."""
-    return lambda _bench: lambda block: Block(block.first, block.counts[:-samples])
+    return lambda _rig: lambda block: Block(block.first, block.counts[:-samples])
 
 
 def late(seconds: float) -> Making:
     """Blocks that come too late."""
 
-    def make(bench: "FaultyBench") -> Change:
-        clock = bench.rig.inner.clock
+    def make(rig: FaultyRig) -> Change:
+        clock = rig.inner.clock
 
         def changed(block: Block) -> Block:
             clock.wait_until(clock.now() + seconds)
@@ -136,9 +133,9 @@ def late(seconds: float) -> Making:
 def jump(seconds: float) -> Making:
     """A clock that is put forward or back."""
 
-    def make(bench: "FaultyBench") -> Change:
+    def make(rig: FaultyRig) -> Change:
         def changed(block: Block) -> Block:
-            bench.rig.faulty_clock.offset += seconds
+            rig.faulty_clock.offset += seconds
             return Block(block.first, block.counts)
 
         return changed

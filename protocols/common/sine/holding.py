@@ -15,7 +15,7 @@ from bench.analysis.steady import WINDOW, SteadyDetector
 from bench.config.model import BenchConfiguration
 from bench.control.sine import Sine, SineControl, SineResponse, Tolerance
 from bench.control.stabiliser import BLEND, DELAY, HoldMonitor, Stabiliser, StabiliserDesign, observed
-from bench.engine.steps import Dwell, Fallen, Measured, Outcome, Publish, SetHarmonics, Step
+from bench.engine.steps import Dwell, Fallen, Measured, Outcome, Publish, Scheduled, SetHarmonics, Step
 from bench.events import Event, StepStarted, event
 from protocols.common.sine.settings import SineParameters
 from protocols.common.sine.settling import (
@@ -138,14 +138,28 @@ def capture_and_measure(run: "Hold", beta: float, report: Report) -> Generator[S
             if not np.isfinite(run.command[0]):
                 reason = "the estimate of the deviation is not finite"
             yield Publish(HoldCycle(run.sine.omega, beta, run.monitor.cycles, *run.last))
+            if reason is None:
+                reason = _delayed((yield SetHarmonics(run.command, run.monitor.cycles - 1 + DELAY, BLEND)))
             if reason is not None:
                 yield SetHarmonics(run.shares)
                 return Held(None, reason, captured=run.monitor.captured_after, cycles=run.monitor.cycles)
-            yield SetHarmonics(run.command, run.monitor.cycles - 1 + DELAY, BLEND)
         if run.monitor.cycles % INTERVAL == 0 and run.recent:
             yield from report(list(run.recent))
         if (held := run.measured()) is not None and held.peak is not None:
             return held
+
+
+def _delayed(outcome: Outcome) -> str | None:
+    """Reason to release a hold whose correction began after the start of its cycle; None if it begins in time.
+
+    `too_late` cannot exclude this, because the delays that a rig adds to the lead are known only once it is open.
+    """
+    if not isinstance(outcome, Scheduled) or outcome.late <= 0.0:
+        return None
+    return (
+        f"a correction came {1e3 * outcome.late:.3g} ms too late for its cycle: the samples are delayed by more than "
+        "acquisition.block_duration and acquisition.lead; reduce them"
+    )
 
 
 def _released(
@@ -190,7 +204,7 @@ class Hold:
         self.sine, self.design = sine, design
         self._table, self._parameters = table, parameters
         self._stabiliser = Stabiliser(design, parameters.hold_authority)
-        self.monitor = HoldMonitor(parameters.hold_authority, PATIENCE, largest, table.answer)
+        self.monitor = HoldMonitor(sine.omega, parameters.hold_authority, PATIENCE, largest, table.answer)
         tolerances = (parameters.amplitude_tolerance, parameters.phase_tolerance, parameters.distortion_tolerance)
         self._control = SineControl(parameters.harmonics, Tolerance(*(AIM * each for each in tolerances)))
         jitter = sine.omega * accuracy.laser_timing

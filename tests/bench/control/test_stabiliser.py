@@ -74,7 +74,7 @@ def test_control_never_exceeds_the_authority_and_a_lost_cycle_is_bridged(
 
 
 def _monitor() -> HoldMonitor:
-    return HoldMonitor(AUTHORITY, patience=200, largest=0.02, answer=0.9 + 0.1j)
+    return HoldMonitor(15.0, AUTHORITY, patience=200, largest=0.02, answer=0.9 + 0.1j)
 
 
 def _quiet(monitor: HoldMonitor, cycles: int, control: float = 1e-4) -> str | None:
@@ -93,13 +93,28 @@ def test_a_motion_is_captured_after_successive_cycles_with_little_control() -> N
     assert monitor.captured_after == 30
 
 
-@pytest.mark.parametrize("turn", [0.7, 1.3, np.exp(0.7j)])
-def test_a_table_that_no_longer_follows_ends_the_hold(turn: complex) -> None:
+@pytest.mark.parametrize(
+    ("turn", "said"),
+    [
+        (0.7, "gain by a factor of 0.70, phase by +0 degrees"),
+        (1.3, "gain by a factor of 1.30, phase by +0 degrees"),
+        (np.exp(0.75j), "gain by a factor of 1.00, phase by +43 degrees"),
+        (np.exp(-0.75j), "gain by a factor of 1.00, phase by -43 degrees, like a delay of 50 ms"),
+    ],
+)
+def test_a_table_that_no_longer_follows_ends_the_hold(turn: complex, said: str) -> None:
     monitor = _monitor()
     assert _quiet(monitor, 30) is None
+    assert monitor.push(0.0, 0.01, 1.0, (0.4 + 0.6 * turn) * (0.9 + 0.1j)) is None
     reason = monitor.push(0.0, 0.01, 1.0, turn * (0.9 + 0.1j))
-    assert reason is not None
-    assert f"changed by a factor of {abs(turn):.2f} and {np.degrees(np.angle(turn)):.0f} degrees" in reason
+    assert reason == f"the table's response to the drive changed: {said}"
+
+
+def test_a_single_cycle_with_another_response_is_borne() -> None:
+    monitor = _monitor()
+    for _ in range(5):
+        assert monitor.push(0.0, 0.01, 1.0, 0.5 * (0.9 + 0.1j)) is None
+        assert _quiet(monitor, 3) is None
 
 
 def test_other_reasons_to_release() -> None:

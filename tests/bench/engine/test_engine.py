@@ -23,6 +23,7 @@ from bench.engine.steps import (
     Plan,
     Publish,
     RampOut,
+    Scheduled,
     SetHarmonics,
     Step,
     Sweep,
@@ -115,6 +116,16 @@ def test_cycles_begin_at_the_phase_asked_for_and_a_change_with_its_cycle() -> No
     reached = (step * (departed - 1) + np.arctan2(cosine, sine) - phase) % tau
     # the first changed sample follows the one at which the cycle begins, and differs little from the sine
     assert min(reached, tau - reached) < 3.0 * step
+
+
+@pytest.mark.parametrize(("lead", "late"), [(100, 0.0), (900, 900.0 - 2.0 * tau / OMEGA * 1000.0)])
+def test_a_change_that_comes_too_late_for_its_cycle_says_by_how_much(lead: int, late: float) -> None:
+    """Two cycles before its own, as soon as the block with their last sample has been read."""
+    bench = Bench(LoopbackRig(lead=lead))
+    bench.run_steps(*RUN[:5], Dwell(2, 2.0), SetHarmonics((1.2,), cycle=4), RampOut())
+    (told,) = (each for each in bench.outcomes if isinstance(each, Scheduled))
+    least = max(late, 0.0) / 1000.0
+    assert least <= told.late <= least + (0.1 if late else 0.0)
 
 
 def test_blocks_are_contiguous_within_a_run_and_counted_anew_in_the_next() -> None:

@@ -30,7 +30,7 @@ from bench.testing.loopback import LoopbackRig
 from drivers.clock import VirtualClock
 from drivers.errors import DeviceTimeout
 from drivers.rig import Alignment, Block, OperatorTask
-from sim.errors import CauseCode
+from sim.errors import CauseCode, InvalidInput
 from sim.parameters import Parameters, quantity
 from sim.specimen import Specimen
 from sim.virtual_bench import VirtualBenchParameters
@@ -120,9 +120,9 @@ class Mishap:
         self.rig._started += 3.0
 
 
-def loopback() -> LoopbackRig:
+def loopback(lead: int = BENCH.lead_samples) -> LoopbackRig:
     """Its lasers see enough not to look stuck; one has a clock of its own."""
-    rig = LoopbackRig()
+    rig = LoopbackRig(lead=lead)
     rig.alignments = (Alignment("laser_1", 0.1, 1.00003, 2e-6, 0.0035, 4000, 1),)
     rig.response |= {"laser_1": lambda volts: 0.01 * volts, "laser_2": lambda volts: 0.02 * volts}
     return rig
@@ -226,6 +226,29 @@ def test_every_ending_comes_again(again: Callable[[str], Replayed], ending: str,
     points = {"completed": 2}.get(status, bool(ENDINGS[ending][1]))
     assert replayed.found.compared[POINTS] == len(replayed.points) == points
     assert replayed.found.compared["estimates"] == len(replayed.points)
+
+
+def with_lead(folder: Path, stored: str | None) -> Path:
+    """A run on a rig whose lead is 7 samples longer than the configured one; `stored` is what its file says of it."""
+    rig = loopback(lead=BENCH.lead_samples + 7)
+    metadata = {} if stored is None else {"lead": stored}
+    recorded(folder / "run.h5", Two().plan(BENCH), rig, BENCH, Found, metadata)
+    return folder / "run.h5"
+
+
+def test_the_lead_of_the_open_rig_counts_not_the_configured_one(tmp_path: Path) -> None:
+    assert played(with_lead(tmp_path, f"{BENCH.lead_samples + 7}")).identical
+
+
+def test_a_file_without_the_lead_of_its_rig_has_the_configured_one(tmp_path: Path) -> None:
+    """As written by earlier versions."""
+    assert played(with_lead(tmp_path, None)).found.differences[0].part == DRIVE
+
+
+@pytest.mark.parametrize("stored", ["", "-1", "7.5", "10001", "9" * 5000, "²"])
+def test_a_lead_that_is_none_is_refused(tmp_path: Path, stored: str) -> None:
+    with pytest.raises(InvalidInput, match="it must be a number of samples from 0 to 10000"):
+        played(with_lead(tmp_path, stored))
 
 
 def test_a_limit_that_was_exceeded_is_exceeded_again(kept: Callable[[str], Path]) -> None:

@@ -90,7 +90,7 @@ def _judged(fault: WiredFault, place: Place, folder: Path) -> tuple[Verdict, boo
             noticed = was_noticed(story, fault)
             if fault.disk == "hung" and noticed:
                 with on_disk(path) as record:
-                    broken += sample_rules(record, story)
+                    broken += sample_rules(record, bench.rig.runs)
             bench.disk.free.set()
             bench.rig.close()
             unsafe = list(end_rules(bench, fault))
@@ -104,6 +104,6 @@ def _judged(fault: WiredFault, place: Place, folder: Path) -> tuple[Verdict, boo
     if not fired:
         broken.append("lost: it never struck")
     with open_datafile(path) as record:
-        broken += [*sample_rules(record, story), *record_rules(record, story, fault)]
+        broken += [*sample_rules(record, bench.rig.runs), *record_rules(record, story, fault)]
     rules = (*unsafe, *broken)
     return Verdict(fault.name, place.name, fired, not fired, noticed, story.status, story.reason, rules), bool(unsafe)

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Generator, Iterator
 from dataclasses import replace
+from itertools import repeat
 from math import nan, tau
 from typing import Any
 
@@ -14,7 +15,7 @@ from bench.config.sections import Acquisition
 from bench.control.oscillator import DriveCalibration
 from bench.control.sine import Sine
 from bench.control.stabiliser import DELAY, StabiliserDesign
-from bench.engine.steps import Done, Dwell, Measured, Outcome, Publish, SetHarmonics, Step
+from bench.engine.steps import Done, Dwell, Measured, Outcome, Publish, Scheduled, SetHarmonics, Step
 from bench.events import StepStarted
 from protocols.common.sine import holding
 from protocols.common.sine.holding import HoldCycle, hold, prepared, too_late
@@ -125,9 +126,12 @@ def test_without_a_stabilising_gain_there_is_no_hold(
 
 
 def held_by(
-    design: StabiliserDesign, peaks: Callable[[bool], Iterator[float]]
+    design: StabiliserDesign, peaks: Callable[[bool], Iterator[float]], late: float = 0.0
 ) -> tuple[Held, list[Step], list[HoldCycle]]:
-    """Result of a hold, its steps and its cycles; `peaks` are those of the held or, if True, of the released motion."""
+    """Result of a hold, its steps and its cycles; `peaks` are those of the held or, if True, of the released motion.
+
+    From the third cycle on the corrections are `late` [s].
+    """
 
     def report(_: list[Cycle]) -> Generator[Step, Outcome, None]:
         yield from ()
@@ -144,6 +148,8 @@ def held_by(
                 drifts = peaks(True)
             elif isinstance(step, Dwell):
                 answer = Measured((cycle(len(steps), next(drifts)),))
+            elif isinstance(step, SetHarmonics) and step.cycle is not None:
+                answer = Scheduled(late if step.cycle > DELAY + 1 else 0.0)
             step = plan.send(answer)
     except StopIteration as end:
         result = end.value
@@ -176,3 +182,14 @@ def test_an_estimate_that_is_not_finite_releases_the_hold(design: StabiliserDesi
     assert all(np.isfinite(step.shares).all() for step in steps if isinstance(step, SetHarmonics))
     assert isinstance(steps[-1], SetHarmonics)
     assert steps[-1].shares == (1.0 + 0.0j,)
+
+
+def test_a_correction_that_comes_too_late_releases_the_hold(design: StabiliserDesign) -> None:
+    """The lead of an open rig may be longer than the configured one, by the delays of its inputs."""
+    result, steps, cycles = held_by(design, lambda _: repeat(DRIFT), late=0.012)
+    assert result.peak is None
+    assert "a correction came 12 ms too late for its cycle" in result.reason
+    assert "acquisition.block_duration and acquisition.lead; reduce them" in result.reason
+    assert len(cycles) == 3
+    assert isinstance(steps[-1], SetHarmonics)
+    assert (steps[-1].shares, steps[-1].cycle) == ((1.0 + 0.0j,), None)
