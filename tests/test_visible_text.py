@@ -1,5 +1,6 @@
 """Reports and figures show printed names, symbols and units; and the rule that finds what is not printed."""
 
+import re
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -23,6 +24,9 @@ from tests.first_edition.command import unpack
 from tests.visible_text import document_texts, faults, figure_texts, html_texts, program_notation
 
 pytestmark = pytest.mark.usefixtures("shared_results")
+
+INDEXED = re.compile(r"\b[A-Za-z]_[A-Za-z]\b")
+"""A symbol whose index is not lowered."""
 
 RUNS = (
     "check",
@@ -115,6 +119,7 @@ def test_reports_are_printed(recording: Recording) -> None:
     texts = list(html_texts(html_page(_undrawn(document))))
     assert len(texts) > 100
     assert not faults(("html", text) for text in texts)
+    assert not [text for text in texts if INDEXED.search(text)]
 
 
 def test_figures_of_runs_are_printed(recording: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -145,6 +150,7 @@ def test_every_kind_of_section_is_printed_in_a_pdf(tmp_path: Path) -> None:
         texts = [page.get_textpage().get_text_range() for page in pdf]
     assert len(" ".join(texts)) > 10_000
     assert not sorted({each for text in texts for each in program_notation(text)})
+    assert not [found for text in texts for found in INDEXED.findall(text)]
 
 
 def _undrawn(document: Document) -> Document:

@@ -20,7 +20,7 @@ _TYPED = re.compile(
 """What is typed in this form: commands, options, keys with their table, names of files, paths."""
 
 _SYMBOL = re.compile(r"(?<![A-Za-z_])[A-Za-z]_(?:[A-Z]|[bcdfgqwyz])(?!\w)")
-"""Symbols with an index that Unicode has not as a subscript, such as k_C and h_b: plain text has no other form."""
+"""Symbols with an index that Unicode has not as a subscript, such as k_C and h_b; a report lowers the index."""
 
 _NOTATION = {
     "identifier": re.compile(r"[A-Za-z]\w*_\w+"),

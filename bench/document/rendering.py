@@ -26,6 +26,9 @@ _DIGITS = re.compile(r"(\.\d\d)\d+")
 _RULE = re.compile(r"<defs>\s*<style.*?</style>\s*</defs>\s*", re.DOTALL)
 _OPENING = re.compile(r"<svg\b([^>]*)>")
 
+_INDEXED = re.compile(r"(?<![\w.\\/-])([A-Za-z])_([A-Za-z])(?![\w.\\-])")
+"""A symbol whose index is not a Unicode character, such as h_b and k_C; not a part of a path."""
+
 INCH = 72.0
 """Points per inch."""
 
@@ -46,11 +49,21 @@ def html_page(document: Document) -> str:
         loader=PackageLoader("bench.document", ""),
         autoescape=True,
         undefined=StrictUndefined,
+        finalize=_with_indices,
         trim_blocks=True,
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
     return environment.get_template("report.html.jinja").render(report=content)
+
+
+def _with_indices(value: object) -> object:
+    """A value for the template; in text, the indices of symbols are lowered."""
+    from markupsafe import Markup, escape
+
+    if not isinstance(value, str) or isinstance(value, Markup):
+        return value
+    return Markup(_INDEXED.sub(r"\1<sub>\2</sub>", str(escape(value))))
 
 
 def write_pdf(path: Path, document: Document) -> None:
