@@ -109,7 +109,7 @@ MEANINGS: Mapping[int, str] = MappingProxyType(
         TOO_CLOSE: "the target is in front of the measuring range",
         TOO_FAR: "the target is beyond the measuring range",
         NOT_CALCULABLE: "the value cannot be calculated",
-        TOO_WIDE: "the reflected peak is too wide or too high",
+        TOO_WIDE: "the reflected peak is too large or too wide",
         LASER_OFF: "the laser is off; its on/off wire must be grounded",
         LATE: "the value did not arrive, or arrived after its block was due",
         IMPLAUSIBLE: "the value differs from its predecessors by more than a moving target allows",

@@ -317,8 +317,8 @@ GOOD = steady(1.0, 0.0)
 @pytest.mark.parametrize(
     ("item", "specimen", "excitation", "options"),
     [
-        ("state", FREE, GOOD, {"state": State(u1=float("nan"))}),
-        ("state", Specimen(), GOOD, {"state": State(theta=0.1)}),
+        ("u1", FREE, GOOD, {"state": State(u1=float("nan"))}),
+        ("theta", Specimen(), GOOD, {"state": State(theta=0.1)}),
         ("theta", FREE, GOOD, {"state": State(theta=2.0)}),
         ("u1", Specimen(beta=0.4), GOOD, {"state": State(u1=0.2)}),
         ("tolerance", FREE, GOOD, {"tolerance": 0.0}),
