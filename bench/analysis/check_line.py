@@ -16,7 +16,7 @@ class Verdict(StrEnum):
     UNTESTED = "untested"
 
 
-_OWN_UNIT = "any"
+OWN_UNIT = "any"
 """Placeholder in the declarations of a line's numbers; `unit` states their actual unit."""
 
 
@@ -26,11 +26,11 @@ class CheckLine(Parameters):
     subject: str = quantity(..., "", "channel or part of the bench that is checked")
     what: str = quantity(..., "", "measured property")
     verdict: Verdict = quantity(..., "", "verdict of the line")
-    measured: float | None = quantity(None, _OWN_UNIT, "measured value, in `unit`")
-    uncertainty: float | None = quantity(None, _OWN_UNIT, "expanded uncertainty (k = 2), in `unit`")
-    expected: float | None = quantity(None, _OWN_UNIT, "expected value, in `unit`")
-    lowest: float | None = quantity(None, _OWN_UNIT, "lowest value that passes, in `unit`")
-    highest: float | None = quantity(None, _OWN_UNIT, "highest value that passes, in `unit`")
+    measured: float | None = quantity(None, OWN_UNIT, "measured value, in `unit`")
+    uncertainty: float | None = quantity(None, OWN_UNIT, "expanded uncertainty (k = 2), in `unit`")
+    expected: float | None = quantity(None, OWN_UNIT, "expected value, in `unit`")
+    lowest: float | None = quantity(None, OWN_UNIT, "lowest value that passes, in `unit`")
+    highest: float | None = quantity(None, OWN_UNIT, "highest value that passes, in `unit`")
     unit: str = quantity("1", "", "unit of the numbers in this line")
     remedy: str = quantity("", "", "remedy if the line has not passed")
 

@@ -138,3 +138,14 @@ def first_words(description: str) -> str:
     """First words of the description of a parameter, without its details."""
     ends = [at for mark in _DETAIL if (at := description.find(mark)) > 0]
     return typeset(description[: min(ends, default=len(description))])
+
+
+_LETTERS = {"alpha": "α", "beta": "β", "xi": "ξ", "omega": "ω"}
+_IN_NAME = re.compile(r"\b(alpha|beta|xi|omega|k|c|m)([0-9]?)\b")
+_LOW = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
+
+
+def label(name: str) -> str:
+    """Typeset the name of a field or channel: `alpha_2_low` becomes α₂ low, `xi1` ξ₁."""
+    plain = name.removesuffix("_rad_s").replace("alpha_1", "α₁").replace("alpha_2", "α₂").replace("_", " ")
+    return typeset(_IN_NAME.sub(lambda found: _LETTERS.get(found[1], found[1]) + found[2].translate(_LOW), plain))

@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.app.display import texts
-from bench.app.display.typography import in_screen_unit, label, typeset
+from bench.app.display.typography import in_screen_unit, typeset
+from bench.document.typography import label
 from bench.live_view import LiveRun, LiveView, Panel, Style, standard_view
 from bench.plugins import plugin_code
 from bench.protocol import Protocol

@@ -7,10 +7,10 @@ from math import hypot, isfinite, nan
 from typing import Any, cast
 
 from bench.app.display import texts
-from bench.app.display.typography import in_screen_unit, label, spaced, typeset
+from bench.app.display.typography import in_screen_unit, spaced, typeset
 from bench.app.formatting import ABSENT, measurement
 from bench.datafile.tables import Column
-from bench.document.typography import first_words, without_unit
+from bench.document.typography import first_words, label, without_unit
 
 NO_LABELS: Mapping[str, str] = {}
 _UNCERTAINTY, _PREDICTED = "_uncertainty", ("_predicted", "_nominal")

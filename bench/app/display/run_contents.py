@@ -11,10 +11,11 @@ from bench.app.catalogue import load_protocol
 from bench.app.display import texts
 from bench.app.display.buffers import BlockAngle, Ring
 from bench.app.display.status import Arrangement
-from bench.app.display.typography import in_screen_unit, label, spaced, typeset
+from bench.app.display.typography import in_screen_unit, spaced, typeset
 from bench.app.display.verdict import running_verdict, verdict_of
 from bench.app.formatting import measurement
 from bench.app.ipc.messages import Run
+from bench.document.typography import label
 from bench.events import Event, PointFinished, SpecimenMounted
 from bench.findings import FitFinished, TableIdentified
 from bench.live_values import Estimate, LiveValue, RunningGain

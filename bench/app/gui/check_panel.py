@@ -22,14 +22,14 @@ from bench.analysis.check_line import CheckLine, Verdict
 from bench.app.catalogue import CHECK, load_protocol
 from bench.app.display import texts
 from bench.app.display.theme import Theme
-from bench.app.display.typography import label, spaced, typeset
+from bench.app.display.typography import spaced, typeset
 from bench.app.folders import default_folder, make_folder, remove_unused
 from bench.app.formatting import ABSENT
 from bench.app.gui.controller import Controller
 from bench.app.gui.widgets import give_key, set_level
 from bench.app.ipc.messages import Ended, Refused, Run
 from bench.config.model import BenchConfiguration
-from bench.document.typography import unit_text
+from bench.document.typography import label, unit_text
 from bench.events import Event, PointFinished
 from sim.errors import RockbenchError
 

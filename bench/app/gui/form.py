@@ -8,7 +8,7 @@ from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QCheckBox, QComboBox, QFormLayout, QHBoxLayout, QLabel, QLineEdit, QVBoxLayout, QWidget
 
 from bench.app.display import texts
-from bench.app.display.typography import label, typeset
+from bench.app.display.typography import typeset
 from bench.app.formatting import as_typed
 from bench.app.gui.widgets import ignore_wheel, set_level
 from bench.app.ipc.messages import PlanCheck, Run
@@ -16,7 +16,7 @@ from bench.app.queue.queue import Queued
 from bench.config.declared import Declared, declared
 from bench.config.model import BenchConfiguration
 from bench.config.validation import problems, read_fields, validated, with_present_names
-from bench.document.typography import unit_text
+from bench.document.typography import label, unit_text
 from sim.parameters import Parameters
 
 Field = QLineEdit | QComboBox | QCheckBox

@@ -8,11 +8,11 @@ from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWidget
 
 from bench.app.display import texts
-from bench.app.display.typography import label, typeset
+from bench.app.display.typography import typeset
 from bench.app.gui.form import default_text
 from bench.app.gui.widgets import set_level
 from bench.config.declared import Declared
-from bench.document.typography import unit_text
+from bench.document.typography import label, unit_text
 from bench.protocol import Protocol
 
 PAGE = Path("reference", "protocols.md")

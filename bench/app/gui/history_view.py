@@ -22,11 +22,12 @@ from bench.app.display import texts
 from bench.app.display.run_file import RunFile
 from bench.app.display.samples import DRIVE, Probe, Spectrum, Stretch, Track, probe, read_spectra, read_stretches
 from bench.app.display.theme import Theme
-from bench.app.display.typography import in_screen_unit, label
+from bench.app.display.typography import in_screen_unit
 from bench.app.formatting import number
 from bench.app.gui.background import FileReader
 from bench.app.gui.sample_plot import Line, SamplePlot
 from bench.app.gui.widgets import ElidingLabel
+from bench.document.typography import label
 
 PARTS = 1200
 """Smallest number of parts of the visible range, each drawn as its minimum and maximum. With fewer than twice as many

@@ -15,10 +15,11 @@ from PySide6.QtWidgets import (
 )
 
 from bench.app.display import texts
-from bench.app.display.typography import in_screen_unit, label, typeset
+from bench.app.display.typography import in_screen_unit, typeset
 from bench.app.formatting import ABSENT, clock
 from bench.app.gui.widgets import set_level
 from bench.app.ipc.messages import PlanChecked
+from bench.document.typography import label
 from bench.preflight.margins import Margin
 
 

@@ -19,14 +19,13 @@ from PySide6.QtWidgets import (
 )
 
 from bench.app.display import texts
-from bench.app.display.typography import label
 from bench.app.formatting import ABSENT, as_typed
 from bench.app.gui.controller import Controller
 from bench.app.gui.queue_runner import QueueRunner
 from bench.app.gui.widgets import FITTING, give_key, scrolling, set_level
 from bench.app.queue.queue import MOST_COPIES, OPEN, Queued, Stage
 from bench.config.declared import Declared, declared
-from bench.document.typography import unit_text
+from bench.document.typography import label, unit_text
 from bench.protocol import Protocol
 
 LOWEST = 150

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from bench.analysis.check_line import OWN_UNIT
 from bench.app.reports.limits import limits_section
 from bench.app.reports.provenance import provenance_line, provenance_section
 from bench.app.reports.specimen import identified_section, modes_section, specimen_section
@@ -15,6 +16,7 @@ from bench.document.typography import (
     ABSENT,
     counted,
     first_words,
+    label,
     listed,
     moment,
     plain,
@@ -39,7 +41,7 @@ def points_section(campaign: Campaign) -> Section | None:
     if not campaign.points:
         return None
     columns = [
-        Column(_heading(name, each.unit), unit_text(each.unit), each.values.dtype.kind in "SU")
+        Column(_heading(name, each.unit), _column_unit(each.unit), each.values.dtype.kind in "SU")
         for name, each in results.items()
     ]
     rows = [[_cell(each, row) for each in results.values()] for row in range(min(len(campaign.points), MOST_CELLS))]
@@ -48,6 +50,11 @@ def points_section(campaign: Campaign) -> Section | None:
         parts.append(f"Further results in the file: {len(campaign.points) - MOST_CELLS}.")
     meanings = [f"{_heading(name, each.unit)}: {first_words(each.description)}" for name, each in results.items()]
     return Section("points", "Results", [*parts, Listing(meanings)])
+
+
+def _column_unit(unit: str) -> str:
+    """The unit for a heading; none for values that each have the unit of their own row."""
+    return "" if unit == OWN_UNIT else unit_text(unit)
 
 
 def _heading(name: str, unit: str) -> str:
@@ -90,7 +97,7 @@ def fits_section(campaign: Campaign) -> Section | None:
 def _parameters(fit: FitFinished) -> Table:
     columns = [Column("parameter", words=True), Column("found"), Column("unit", words=True)]
     rows = [
-        [_words(name), with_uncertainty(found.value, COVERAGE * found.uncertainty), unit_text(found.unit)]
+        [label(name), with_uncertainty(found.value, COVERAGE * found.uncertainty), unit_text(found.unit)]
         for name, found in fit.parameters.items()
     ]
     return Table(f"Results of the fit {typeset(fit.name)} (expanded uncertainties, k = 2)", columns, rows)

@@ -43,7 +43,7 @@ def test_fits_and_points_are_shown_with_their_units(tmp_path: Path) -> None:
     assert fits is not None
     assert points is not None
     (table,) = [part for part in fits.parts if isinstance(part, Table)]
-    assert table.rows == [["omega 1", "6.010 ± 0.025", "rad/s"], ["k", "213.0 ± 3.0", "N/m"]]
+    assert table.rows == [["ω 1", "6.010 ± 0.025", "rad/s"], ["k", "213.0 ± 3.0", "N/m"]]
     (picture,) = [part for part in fits.parts if isinstance(part, Picture)]
     labels = [panel.get_ylabel() for panel in picture.figure.axes]
     assert labels == ["acceleration, fitted  [m/s²]", "residual  [m/s²]"]
