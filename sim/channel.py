@@ -49,6 +49,11 @@ class Channel:
         values[(counts < self.valid[0]) | (counts > self.valid[1])] = np.nan
         return values
 
+    def meaning(self, count: int) -> str:
+        """Why an invalid count is invalid."""
+        end = "lower" if count < self.valid[0] else "upper"
+        return self.faults.get(count) or f"beyond the {end} end of its range"
+
     @property
     def limits(self) -> tuple[float, float]:
         """Smallest and largest value [unit] of the valid counts."""

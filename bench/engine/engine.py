@@ -52,7 +52,7 @@ class Engine:
         self._output = Output(rig, guard, stream, requests, block)
         self._loop = Loop(self._output, guard, stream, requests)
         self._rest = AtRest(self._loop, rig, guard, stream)
-        self._sines = SineDrive(self._loop, rig.sample_rate)
+        self._sines = SineDrive(self._loop, rig)
         self._prepared = PreparedDrive(self._loop, guard, stream)
         self._specimen: Specimen | None = None
         self.returned: object = None

@@ -1,5 +1,6 @@
 """Acquisition loop and the steps that run in it."""
 
+from collections import Counter
 from contextlib import suppress
 from math import ceil, tau
 from typing import Never
@@ -46,6 +47,8 @@ class Loop:
     def __init__(self, output: Output, guard: Guard, stream: EventStream, requests: Requests) -> None:
         self.output = output
         self._guard, self._stream, self._requests = guard, stream, requests
+        self.latest: Counts | None = None
+        """Counts of the last block."""
         self.fall: FallWatch | None = None
         """Detector of the fall of the mounted block; None if no specimen is mounted."""
         self._over: Violation | None = None
@@ -77,7 +80,9 @@ class Loop:
     def signals(self) -> tuple[NDArray[np.float64], bool]:
         """Run one iteration. Returns signals, shape (block, len(SIGNALS)), and whether the rocking block has fallen."""
         # only the standard signals: missing samples of an additional channel must not invalidate the plan's cycles
-        signals = self.exchange().signals[:, : len(SIGNALS)]
+        exchange = self.exchange()
+        self.latest = exchange.block.counts
+        signals = exchange.signals[:, : len(SIGNALS)]
         return signals, self.fall is not None and self.fall.fallen(signals)
 
     def check_requests(self) -> None:
@@ -203,8 +208,8 @@ class AtRest:
 class SineDrive:
     """Sweeps and dwells of the oscillator; cycles are counted across dwells until the drive changes."""
 
-    def __init__(self, loop: Loop, sample_rate: float) -> None:
-        self._loop, self._rate = loop, sample_rate
+    def __init__(self, loop: Loop, rig: Rig) -> None:
+        self._loop, self._rate, self._channels = loop, rig.sample_rate, rig.channels
         self._cycles: CycleAnalyser | None = None
 
     def restart(self) -> None:
@@ -234,6 +239,7 @@ class SineDrive:
             first = output.read if step.phase is None else self._sample_at(step.phase)
             self._cycles = CycleAnalyser(output.source.oscillator.omega, self._rate, first)
         done: list[Cycle] = []
+        missing = Counter[tuple[int, int]]()
         end = self._cycles.completed + step.cycles
         while self._cycles.completed < end:
             first = output.read
@@ -242,8 +248,11 @@ class SineDrive:
                 return Fallen()
             values = np.empty((len(signals), len(SIGNALS) + 1), order="F")
             values[:, :-1], values[:, -1] = signals, output.drive
+            if self._loop.latest is not None and np.isnan(signals).any():
+                missing += self._invalid(self._loop.latest)
             done += self._cycles.push(values[max(self._cycles.first - first, 0) :])
-        return Measured(tuple(done))
+        most = missing.most_common(1)
+        return Measured(tuple(done), (self._channels[most[0][0][0]], most[0][0][1]) if most else None)
 
     def set_harmonics(self, step: SetHarmonics) -> Scheduled:
         """Change the harmonics of the sine."""
@@ -252,6 +261,15 @@ class SineDrive:
             wait = self._cycles.start_of(step.cycle) - output.begins
         output.source.oscillator.trim(step.shares, step.blend, max(wait, 0))
         return Scheduled(max(-wait, 0) / self._rate)
+
+    def _invalid(self, counts: Counts) -> Counter[tuple[int, int]]:
+        """Number of samples of each invalid count in a block, by column and count."""
+        return Counter(
+            (column, count)
+            for column, channel in enumerate(self._channels)
+            for count in counts[:, column].tolist()
+            if not channel.valid[0] <= count <= channel.valid[1]
+        )
 
     def _sample_at(self, phase: float) -> int:
         """Index of the first sample not yet read at which the held sine has `phase` [rad]."""

@@ -169,9 +169,13 @@ class Played:
 
 @dataclass(frozen=True)
 class Measured:
-    """Cycles of a dwell, in order; they are fewer than requested if samples were missing."""
+    """Cycles of a dwell, in order; they are fewer than requested if samples were missing.
+
+    `missing` is the channel and the invalid count of most missing samples of the dwell, or None.
+    """
 
     cycles: tuple[Cycle, ...]
+    missing: tuple[Channel, int] | None = None
 
 
 @dataclass(frozen=True)

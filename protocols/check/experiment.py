@@ -43,7 +43,14 @@ from drivers.rig import OperatorTask
 from protocols.check.comparison import Sines, allowed_delay, delay_lines, scale_lines, table_delay_lines
 from protocols.check.lines import alignment_lines, drive_lines, expected_drive, input_lines, resting_lines, safety_lines
 from protocols.check.protocol import MARKS, CheckParameters, allowed_range, number
-from protocols.common.calibrate import CHANGE_TIME, SETTLING, Unmeasurable, calibrate_drive, need_cycles, probed_drive
+from protocols.common.calibrate import (
+    CHANGE_TIME,
+    SETTLING,
+    Unmeasurable,
+    calibrate_drive,
+    complete_cycles,
+    probed_drive,
+)
 from sim.errors import InvalidInput
 from sim.parameters import Parameters
 
@@ -194,8 +201,7 @@ def _measured_sines(parameters: CheckParameters) -> Generator[Step, Outcome, Sin
         outcome = yield Dwell(SETTLING + parameters.cycles)
         if not isinstance(outcome, Measured):
             raise Unmeasurable(_FALLEN)
-        cycles = outcome.cycles[SETTLING:]
-        need_cycles(cycles, parameters.cycles)
+        cycles = complete_cycles(outcome, parameters.cycles)
         found.append(np.mean([cycle.fundamental for cycle in cycles], axis=0))
     yield Publish(Progress(1.0, 0.0, "common motion finished"))
     columns = np.array(found).T

@@ -11,11 +11,11 @@ from bench.analysis.cycles import COMPLETE
 from bench.analysis.gain import COVERAGE, SensorAccuracy
 from bench.config.model import BenchConfiguration
 from bench.engine.steps import RestSamples
-from drivers.optoncdt.codec import IMPLAUSIBLE, LATE, LOST
 from drivers.rig import Alignment, Channel, Counts
 from drivers.timebase.marking import expected_uncertainty
 from protocols.check.comparison import Sines
 from protocols.check.protocol import CheckParameters
+from protocols.common.missing import cause
 from sim.channel import STOREYS, TABLE_ACCELERATION, TABLE_DISPLACEMENT
 
 _STUCK = 0.01
@@ -27,13 +27,6 @@ _FINEST = 1e-5
 """Step of the search for the dead time [s]."""
 
 _UNKNOWN = "the delay of this input module is unknown: compare the delay lines, or use a supported module"
-_OF_THE_LINE = {
-    LATE: "the computer was busy, or the sensor is silent: close other programs, increase acquisition.lead,"
-    " or check the sensor's power and port",
-    LOST: "check the cable, the RS422 adapter and its latency timer",
-    IMPLAUSIBLE: "bit errors on the serial line: check the cable, its shield and the RS422 adapter",
-}
-"""Remedies for values that were measured but arrived late, corrupted or not at all."""
 _MISSING = "the program does not read this input: make sure that its contact opens the enable chain directly"
 _ALONE = "nothing opens the enable relay if the program crashes: wire a heartbeat relay, or set a watchdog"
 
@@ -174,13 +167,4 @@ def _reason(channel: Channel, invalid: Counts) -> str:
     if invalid.size == 0:
         return ""
     values, numbers = np.unique(invalid, return_counts=True)
-    most = int(values[numbers.argmax()])
-    why = channel.faults.get(most)
-    if why is None:
-        end = "lower" if most < channel.valid[0] else "upper"
-        why = f"beyond the {end} end of its range"
-    if (remedy := _OF_THE_LINE.get(most)) is not None and most in channel.faults:
-        return f"{why}: {remedy}"
-    if channel.name in STOREYS:
-        return f"{why}: check that the laser is on and that the storey rests in the middle of the laser's range"
-    return f"{why}: check the sensor's supply, its cable, and the terminal and range of the input"
+    return cause(channel, int(values[numbers.argmax()]), at_rest=True)

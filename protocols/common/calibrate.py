@@ -10,6 +10,7 @@ from bench.analysis.cycles import Cycle, mean_amplitude
 from bench.analysis.signals import ACCELERATION, SIGNALS
 from bench.control.oscillator import DriveCalibration, Segment
 from bench.engine.steps import Calibrate, Dwell, Fallen, Measured, Outcome, Step, Sweep
+from protocols.common.missing import cause
 from sim.errors import RockbenchError
 
 PROBE = 0.02
@@ -81,8 +82,7 @@ def probed_drive(omega: float) -> Generator[Step, Outcome, DriveCalibration]:
     for volts in (PROBE, 10.0 * PROBE):
         yield Sweep((Segment(CHANGE_TIME, volts, omega),))
         outcome = yield Dwell(SETTLING + _PROBED)
-        cycles = outcome.cycles[SETTLING:] if isinstance(outcome, Measured) else ()
-        need_cycles(cycles, _PROBED)
+        cycles = complete_cycles(outcome if isinstance(outcome, Measured) else Measured(()), _PROBED)
         answer = np.array([cycle.fundamental[ACCELERATION] / cycle.fundamental[_DRIVE] for cycle in cycles])
     yield Sweep((Segment(CHANGE_TIME, 0.0, omega),))
     gain, doubt = abs(complex(answer.mean())), _standard_error(answer)
@@ -117,8 +117,7 @@ def _measure(omega: float, amplitude: float) -> Generator[Step, Outcome, complex
     outcome = yield Dwell(SETTLING + MEASURED)
     if not isinstance(outcome, Measured):
         return Fallen()
-    used = outcome.cycles[SETTLING:]
-    need_cycles(used, MEASURED)
+    used = complete_cycles(outcome, MEASURED)
     need_answer(used)
     return drive_response(used)
 
@@ -135,14 +134,16 @@ class Unmeasurable(RockbenchError):
     error_code = "not_measurable"
 
 
-def need_cycles(cycles: Sequence[Cycle], asked: int) -> None:
-    """Raise Unmeasurable if too many cycles have missing samples."""
+def complete_cycles(outcome: Measured, asked: int, settling: int = SETTLING) -> tuple[Cycle, ...]:
+    """The `asked` cycles of a dwell after those of `settling`. Raises Unmeasurable if too many have missing samples."""
+    cycles = outcome.cycles[settling:]
     if len(cycles) < ENOUGH * asked:
-        raise Unmeasurable(
-            f"{asked - len(cycles)} of {asked} cycles have missing samples: a sensor exceeded its range, or its "
-            "values were late; the data file states the reason for each sample. Move the sensor, reduce the motion, "
-            "increase acquisition.lead, or close other programs"
-        )
+        why = "."
+        if outcome.missing is not None:
+            channel, count = outcome.missing
+            why = f" of {channel.name}: {cause(channel, count, at_rest=False)}"
+        raise Unmeasurable(f"{asked - len(cycles)} of {asked} cycles have missing samples{why}")
+    return cycles
 
 
 def need_answer(cycles: Sequence[Cycle]) -> None:

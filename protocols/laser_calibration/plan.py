@@ -23,7 +23,7 @@ from bench.engine.steps import (
     Sweep,
 )
 from bench.events import Progress, StepStarted
-from protocols.common.calibrate import SETTLING, Unmeasurable, calibrate_drive, need_cycles, probed_drive
+from protocols.common.calibrate import SETTLING, Unmeasurable, calibrate_drive, complete_cycles, probed_drive
 from protocols.laser_calibration.fit import ErrorCurve, Pass, calibration, fit_curve, mean_pass
 from protocols.laser_calibration.protocol import LaserCalibrationParameters
 from sim.channel import STOREYS
@@ -131,9 +131,7 @@ def _passes(parameters: LaserCalibrationParameters) -> Generator[Step, Outcome, 
         outcome = yield Dwell(SETTLING + parameters.cycles)
         if not isinstance(outcome, Measured):
             raise Unmeasurable(_LOOSE)
-        cycles = outcome.cycles[SETTLING:]
-        need_cycles(cycles, parameters.cycles)
-        passes.append(mean_pass(cycles, omega))
+        passes.append(mean_pass(complete_cycles(outcome, parameters.cycles), omega))
     yield Publish(_progress(parameters, len(passes), "passes finished"))
     return passes
 

@@ -15,7 +15,7 @@ from bench.analysis.steady import WINDOW, Steadiness, SteadyDetector
 from bench.config.model import BenchConfiguration
 from bench.control.sine import Sine, SineControl, SineResponse, Tolerance
 from bench.engine.steps import Dwell, Fallen, Measured, Outcome, SetHarmonics, Step
-from protocols.common.calibrate import need_cycles
+from protocols.common.calibrate import complete_cycles
 from protocols.common.sine.settings import SineParameters
 
 INTERVAL = 6
@@ -132,17 +132,17 @@ def settle_and_measure(
         if not isinstance(outcome, Measured):
             return Fallen()
         waited += asked * tau / sine.omega
-        need_cycles(outcome.cycles, asked)
-        turn = sine.turn(outcome.cycles[0]) if turn is None else turn
-        for cycle in outcome.cycles:
+        cycles = complete_cycles(outcome, asked, settling=0)
+        turn = sine.turn(cycles[0]) if turn is None else turn
+        for cycle in cycles:
             detector.push(cycle)
         # the first cycles after a correction of the drive are transient
-        constant.extend(outcome.cycles if constant or not updates else outcome.cycles[TRANSIENT:])
+        constant.extend(cycles if constant or not updates else cycles[TRANSIENT:])
         if ready:
             # twice the tolerance is allowed, since at the tolerance itself noise would decide the verdict
             steadiness = detector.judge(allowance=2.0)
             if steadiness.steady or over:
-                used = outcome.cycles[-parameters.measured_cycles :]
+                used = cycles[-parameters.measured_cycles :]
                 table = SineResponse.of(used, sine, turn)
                 motion = orbit = None
                 if steadiness.steady:
@@ -155,10 +155,10 @@ def settle_and_measure(
                 return Settled(
                     peak, steadiness, waited, table.amplitude_error, table.phase_error, updates, motion, orbit, state
                 )
-        recent.extend(outcome.cycles)
+        recent.extend(cycles)
         yield from report(list(recent))
         over = waited >= parameters.settle_limit
-        shares = control.next(SineResponse.of(outcome.cycles[TRANSIENT:], sine, turn))
+        shares = control.next(SineResponse.of(cycles[TRANSIENT:], sine, turn))
         if shares is not None and not over:
             yield SetHarmonics(shares)
             drive = shares

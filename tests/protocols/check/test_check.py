@@ -120,14 +120,37 @@ def _reversing(names: list[str]) -> Callable[..., Rig]:
     def turned(channel: Channel) -> Channel:
         return replace(channel, scale=-channel.scale, offset=-channel.offset) if channel.name in names else channel
 
+    return _with_channels(turned)
+
+
+def _with_channels(changed: Callable[[Channel], Channel]) -> Callable[..., Rig]:
+    """Opens the simulated bench with some channels changed."""
+
     def opened(configuration: BenchConfiguration, *, realtime: bool) -> Rig:
         rig = open_rig(configuration, realtime=realtime)
-        channels = tuple(turned(channel) for channel in rig.channels)
+        channels = tuple(changed(channel) for channel in rig.channels)
         wired = type("Rewired", (type(rig),), {"channels": property(lambda _self: channels)})
         rig.__class__ = wired
         return rig
 
     return opened
+
+
+def test_samples_that_are_missing_in_motion_are_explained(check: Check, monkeypatch: pytest.MonkeyPatch) -> None:
+    def narrow(channel: Channel) -> Channel:
+        # 6 mm to either side: the motion at the lowest frequency, 7.5 mm, is beyond it for a moment only
+        if channel.name != "laser_2":
+            return channel
+        middle, reach = sum(channel.valid) // 2, round(0.006 / abs(channel.scale))
+        return replace(channel, valid=(middle - reach, middle + reach))
+
+    monkeypatch.setattr(bench.app.session, "open_rig", _with_channels(narrow))
+    code, lines = check()
+    assert failures(lines) == [("bench", "motion")]
+    remedy = next(line["remedy"] for line in lines if line["verdict"] == "failed")
+    assert "cycles have missing samples of laser_2: beyond the" in remedy
+    assert "reduce the motion" in remedy
+    assert code == 1
 
 
 def test_a_table_that_does_not_answer_is_a_line_and_the_clamps_come_off(check: Check, tmp_path: Path) -> None:
