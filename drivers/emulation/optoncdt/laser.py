@@ -72,7 +72,7 @@ class Line:
         return np.insert(stream, place, np.frombuffer(answer, dtype=np.uint8))
 
 
-_TURN = 0.002
+_TURN = 0.004
 """Pause between two services of the line [s]."""
 _RATES = (250.0, 500.0, 1000.0, 2000.0, 4000.0, 8000.0)
 """Measuring rates of a recent sensor [1/s]; older sensors lack the last rate (manual of the optoNCDT 1420, p. 84)."""

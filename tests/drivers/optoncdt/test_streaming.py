@@ -131,6 +131,7 @@ def without_queries(script: Script) -> Script:
     return answered
 
 
+@pytest.mark.milliseconds
 @pytest.mark.parametrize(("sent", "refused"), [(4000, False), (2000, True)])
 def test_the_rate_is_counted_where_the_sensor_does_not_report_it(
     monkeypatch: pytest.MonkeyPatch, sent: int, refused: bool
