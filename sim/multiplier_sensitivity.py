@@ -17,7 +17,7 @@ from sim.knowledge import FRAME, RESTITUTION, SPRING, scaled
 from sim.return_map import DIFFERENCE, images, parameters, scales
 from sim.shaker import Shaker
 from sim.specimen import Specimen
-from sim.steady import Orbit, slowest_of
+from sim.steady import NoOrbit, Orbit, slowest_of
 from sim.table_orbit import STEP, SUBSTEPS, TableOrbit, TablePeriod, harmonics_of
 
 Floats = NDArray[np.float64]
@@ -59,7 +59,9 @@ class _Map(Protocol):
 
 
 def fixed_slopes(orbit: Orbit) -> MultiplierSlopes:
-    """Sensitivities of the dominant multiplier of a rocking orbit on fixed ground."""
+    """Sensitivities of the dominant multiplier of a rocking orbit on fixed ground. Raises NoOrbit if the map is not
+    defined around it.
+    """
     return _on_fixed_ground(orbit)[0]
 
 
@@ -130,6 +132,8 @@ def _slopes(
     themselves; the images of the other elements are zero. `steps`, shape (n,), are those of the finite differences.
     """
     sides = image("", 1.0, np.concatenate((z + np.diag(steps), z - np.diag(steps))))
+    if not np.isfinite(sides).all():
+        raise NoOrbit(f"the orbit at omega = {omega:g} rad/s is too unstable to be differentiated")
     jacobian = ((sides[: z.size] - sides[z.size :]) / (2.0 * steps)[:, None]).T
     closing = jacobian - np.diag(np.arange(z.size) < states)
     values, vectors = np.linalg.eig(jacobian[:states, :states])

@@ -235,13 +235,16 @@ def _slope(found: Found, name: str, *, of_frequency: bool = False) -> float:
 
 def _found(orbit: Orbit, ground: Ground, shaker: Shaker, harmonics: int, sensitivity: bool) -> Found:
     """Multiplier with the largest modulus on `ground`, with its sensitivities on request."""
-    if ground == "fixed ground":
-        return Found(orbit.slowest, fixed_slopes(orbit) if sensitivity else None)
+    found = Found()
     try:
+        if ground == "fixed ground":
+            found = Found(orbit.slowest)
+            return Found(orbit.slowest, fixed_slopes(orbit)) if sensitivity else found
         moving = table_orbit(orbit, shaker, harmonics)
-        return Found(moving.slowest, table_slopes(moving, orbit, shaker) if sensitivity else None)
+        found = Found(moving.slowest)
+        return Found(moving.slowest, table_slopes(moving, orbit, shaker)) if sensitivity else found
     except NoOrbit:
-        return Found()
+        return found
 
 
 def _kind(multiplier: complex) -> str:
