@@ -136,7 +136,8 @@ def _slopes(
         raise NoOrbit(f"the orbit at omega = {omega:g} rad/s is too unstable to be differentiated")
     jacobian = ((sides[: z.size] - sides[z.size :]) / (2.0 * steps)[:, None]).T
     closing = jacobian - np.diag(np.arange(z.size) < states)
-    values, vectors = np.linalg.eig(jacobian[:states, :states])
+    found = np.linalg.eig(jacobian[:states, :states])
+    values, vectors = found.eigenvalues.astype(np.complex128), found.eigenvectors.astype(np.complex128)
     at = int(np.argmax(np.where(values.imag >= 0.0, np.abs(values), 0.0)))
     left, v = np.linalg.inv(vectors)[at], np.zeros(z.size, dtype=np.complex128)
     v[:states] = vectors[:, at]
