@@ -87,7 +87,9 @@ def stability_points(
 
     def point(branch: tuple[float, float, Orbit, float]) -> StabilityPoint:
         beta, factor, orbit, alpha_2 = branch
-        on = {ground: _found(orbit, ground, shaker, request.harmonics, request.sensitivity) for ground in GROUNDS}
+        on: dict[Ground, Found] = {
+            ground: _found(orbit, ground, shaker, request.harmonics, request.sensitivity) for ground in GROUNDS
+        }
         return StabilityPoint(beta, factor, orbit, alpha_2, on)
 
     return in_threads(point, branches, counting(progress, "computing the orbits on the table"))
@@ -131,7 +133,7 @@ def stability_boundaries(
     """Changes of stability between adjacent frequencies of `points`, located by bisection, by ground, stiffness,
     amplitude and frequency.
     """
-    changes = [
+    changes: list[tuple[Ground, StabilityPoint, StabilityPoint]] = [
         (ground, low, high)
         for ground in GROUNDS
         for low, high in pairwise(points)
