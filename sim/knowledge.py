@@ -87,7 +87,7 @@ class SpecimenKnowledge(SpecimenUncertainty):
         if self.give > 0.0:
             columns[RESTITUTION] = columns[RESTITUTION] * (1.0 + self.give * random.uniform(-1.0, 1.0, n))
         rows = np.column_stack(list(columns.values())).tolist()
-        return [_off(specimen, dict(zip(columns, row, strict=True))) for row in rows]
+        return [scaled(specimen, dict(zip(columns, row, strict=True))) for row in rows]
 
     def relative(self, specimen: Specimen) -> dict[str, float]:
         """Relative standard uncertainty of every uncertain quantity of `specimen`, by name."""
@@ -119,16 +119,30 @@ class SpecimenKnowledge(SpecimenUncertainty):
         """
         sizes = self.relative(specimen)
         names = list(sizes)
+        steps = np.array(list(sizes.values()))[:, None] * root_of(self._matrix(specimen, names))
+
+        def moved(step: Floats) -> Specimen:
+            return scaled(specimen, dict(zip(names, (1.0 + step).tolist(), strict=True)))
+
+        return [(moved(step), moved(-step)) for step in steps.T if step.any()]
+
+    def propagated(self, specimen: Specimen, slopes: Mapping[str, float]) -> tuple[float, dict[str, float]]:
+        """Standard uncertainty of a result to first order (GUM Eq. 13), and the contribution of each uncertain
+        quantity, largest first. `slopes` are the derivatives of the result with respect to their logarithms.
+        """
+        sizes = self.relative(specimen)
+        parts = np.array([slopes[name] * size for name, size in sizes.items()])
+        combined = sqrt(max(float(parts @ self._matrix(specimen, list(sizes)) @ parts), 0.0))
+        each = dict(zip(sizes, np.abs(parts).tolist(), strict=True))
+        return combined, dict(sorted(each.items(), key=lambda part: -part[1]))
+
+    def _matrix(self, specimen: Specimen, names: list[str]) -> Floats:
+        """Correlation matrix of the uncertain quantities `names`, shape (n, n)."""
         matrix = np.eye(len(names))
         for (one, other), coefficient in self.correlations(specimen).items():
             i, j = names.index(one), names.index(other)
             matrix[i, j] = matrix[j, i] = coefficient
-        steps = np.array(list(sizes.values()))[:, None] * root_of(matrix)
-
-        def moved(step: Floats) -> Specimen:
-            return _off(specimen, dict(zip(names, (1.0 + step).tolist(), strict=True)))
-
-        return [(moved(step), moved(-step)) for step in steps.T if step.any()]
+        return matrix
 
     def only(self, *widths: str) -> Self:
         """Return a copy in which all quantities are exact except those whose half width is named in `widths`."""
@@ -168,7 +182,7 @@ def _governor(finding: str) -> str:
     return _WIDTH.get(finding, _OF_MASSES if finding in FRAME else _WIDTH[SPRING])
 
 
-def _off(specimen: Specimen, factors: Mapping[str, float]) -> Specimen:
+def scaled(specimen: Specimen, factors: Mapping[str, float]) -> Specimen:
     """Return `specimen` with its values multiplied by the factors, within the physical range.
 
     The factor of the spring applies to k_C, and is independent of k1.

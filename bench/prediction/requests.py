@@ -10,6 +10,8 @@ from sim.parameters import COUPLING, Parameters, each_once, quantity
 Frequency = Annotated[float, Field(gt=0, le=1000)]
 Stiffness = Annotated[float, Field(ge=0, le=1000)]
 
+Factor = Annotated[float, Field(gt=0, le=1000)]
+
 Corner = Annotated[float, Field(gt=0, le=50)]
 
 SolverName = Literal["taylor", "paper", "rk4-located", "dop853"]
@@ -33,15 +35,20 @@ class ModesRequest(Parameters):
     _each_once = field_validator("beta")(each_once)
 
 
-class OrbitsRequest(Parameters):
-    """Points at which the steady motions under a sine are computed."""
+class GridRequest(Parameters):
+    """Frequencies and stiffnesses; every frequency is combined with every stiffness."""
 
     omega: tuple[Frequency, ...] = _frequencies((12.5, 15.0, 17.5, 20.0))
     beta: tuple[Stiffness, ...] = _stiffnesses((0.25, 0.64, 0.97))
+    _each_once = field_validator("omega", "beta")(each_once)
+
+
+class OrbitsRequest(GridRequest):
+    """Points at which the steady motions under a sine are computed."""
+
     amplitude_factor: float = quantity(
         1.01, "1", "amplitude of the base acceleration, relative to the uplift acceleration g/lambda", gt=0, le=1000
     )
-    _each_once = field_validator("omega", "beta")(each_once)
 
 
 class SineRequest(OrbitsRequest):
@@ -102,7 +109,7 @@ class MapRequest(GainRequest):
     )
 
 
-class OnTableRequest(OrbitsRequest):
+class OnTableRequest(GridRequest):
     """Points at which steady motions are computed on a table that reacts to the force of the block."""
 
     table_mass: float | None = quantity(
@@ -123,9 +130,24 @@ class StabilityRequest(OnTableRequest):
 
     omega: tuple[Frequency, ...] = _frequencies(spaced("12", "16", 41), least=2)
     beta: tuple[Stiffness, ...] = _stiffnesses((0.64, 0.97))
+    amplitude_factor: tuple[Factor, ...] = quantity(
+        (1.01,),
+        "1",
+        "amplitudes of the base acceleration, relative to the uplift acceleration g/lambda: values, or "
+        "start:stop:count",
+        min_length=1,
+    )
+    sensitivity: bool = quantity(
+        False,
+        "",
+        "also compute the sensitivities of the multipliers at every point (about 2 s of processor time per point); "
+        "boundaries always have them",
+    )
+
+    _factors_once = field_validator("amplitude_factor")(each_once)
 
 
-class AttractorRequest(OnTableRequest):
+class AttractorRequest(OnTableRequest, OrbitsRequest):
     """Long-term motions where the rocking orbit is unstable, on a table that reacts to the force of the block."""
 
     omega: tuple[Frequency, ...] = _frequencies((12.5, 15.0))

@@ -26,6 +26,16 @@ from protocols.common.sine.demands import (
 )
 from protocols.common.sine.holding import PATIENCE, too_late
 from protocols.common.sine.pace import Pace
+from protocols.stability.laws import (
+    HOUSNER,
+    WORDS,
+    LawPrediction,
+    closest,
+    deviation,
+    law_boundaries,
+    law_prediction,
+    predicted_columns,
+)
 from protocols.stability.plan import SWEEP_TIME, Place, StabilityPlan
 from protocols.stability.prediction import on_table, rocking
 from protocols.stability.protocol import StabilityParameters, StabilityPoint
@@ -34,6 +44,7 @@ from protocols.stability.results import stability_figure, stability_table
 from sim.errors import InvalidInput
 from sim.loading import load_model
 from sim.parameters import Parameters
+from sim.restitution_laws import laws as laws_of
 from sim.sweep import in_threads
 
 CURVE = 25
@@ -120,21 +131,30 @@ class StabilityTest(Prepared[StabilityParameters]):
         uplift = self._specimen.uplift_acceleration
         places = self._curve()
 
-        def computed() -> dict[str, Any]:
-            def one(place: Place) -> tuple[complex, complex]:
-                orbit = rocking(self._specimen, place.omega, place.factor * uplift)
-                none = complex(np.nan, np.nan)
-                if orbit is None:
-                    return none, none
-                return orbit.slowest, on_table(orbit, shaker, p.harmonics) or none
+        known = self.configuration.known_on_table
 
+        def one(place: Place) -> dict[str, Any]:
+            orbit = rocking(self._specimen, place.omega, place.factor * uplift)
+            none = complex(np.nan, np.nan)
+            if orbit is None:
+                laws = LawPrediction({law.name: np.nan for law in laws_of(p.impulse_offset)}, np.nan, np.nan)
+                return {"fixed": [np.nan] * 2, "table": [np.nan] * 2, **predicted_columns(laws)}
+            moving = on_table(orbit, shaker, p.harmonics)
+            multiplier = orbit.slowest if moving is None else moving
+            laws = law_prediction(orbit, multiplier, known, shaker, p.harmonics, p.impulse_offset)
+            pairs = {"fixed": orbit.slowest, "table": none if moving is None else moving}
+            return {**{name: [z.real, z.imag] for name, z in pairs.items()}, **predicted_columns(laws)}
+
+        def computed() -> dict[str, Any]:
             found = in_threads(one, places, counting(self.progress, "predicting the multipliers"))
-            return {"fixed": [[z.real, z.imag] for z, _ in found], "table": [[z.real, z.imag] for _, z in found]}
+            return {name: [each[name] for each in found] for name in found[0]}
 
         model = None if shaker is None else shaker.model_dump(mode="json")
         inputs = [self._specimen.model_dump(mode="json"), [[each.omega, each.factor] for each in places], model]
-        stored = cached("stability_curve", [*inputs, p.harmonics], computed)
+        uncertain = [known.model_dump(mode="json"), p.impulse_offset]
+        stored = cached("stability_curve", [*inputs, p.harmonics, *uncertain], computed)
         fixed, table = (np.array(stored[name]) @ np.array([1.0, 1j]) for name in ("fixed", "table"))
+        others = {law.name: law.words for law in laws_of(p.impulse_offset)}
         return {
             "omega_rad_s": Column(np.array([each.omega for each in places]), "rad/s", "circular frequency"),
             "amplitude_factor": Column(
@@ -147,6 +167,17 @@ class StabilityTest(Prepared[StabilityParameters]):
             "table_modulus": Column(np.abs(table), "1", "modulus of the dominant multiplier on the simulated table"),
             "table_angle_rad": Column(
                 np.abs(np.angle(table)), "rad", "argument of the dominant multiplier, simulated table"
+            ),
+            **{
+                f"{name}_modulus": Column(
+                    np.array(stored[f"{name}_modulus"]), "1", f"modulus of the dominant multiplier with {words}"
+                )
+                for name, words in others.items()
+            },
+            "law_modulus_uncertainty": Column(
+                np.array(stored["law_modulus_uncertainty"]),
+                "1",
+                "expanded uncertainty (k = 2) of a modulus with an exact law of restitution, due to the specimen",
             ),
         }
 
@@ -168,5 +199,23 @@ class StabilityTest(Prepared[StabilityParameters]):
         return Result(
             points=tuple(points),
             text=stability_table(rows, curve),
+            findings={"restitution_laws": self._laws(rows, curve)},
             figures={"stability.png": lambda path: write_figure(path, stability_figure(rows, curve))},
         )
+
+    def _laws(self, rows: Sequence[StabilityPoint], curve: Mapping[str, Any]) -> list[dict[str, Any]]:
+        """Restitution, predicted boundaries and normalised deviations of the measured moduli of each law."""
+        block = self._specimen.block
+        restitution = {HOUSNER: block.restitution}
+        restitution |= {law.name: law.restitution(block) for law in laws_of(self.parameters.impulse_offset)}
+        places = law_boundaries(curve)
+        return [
+            {
+                "law": law,
+                "restitution": restitution[law],
+                "boundaries": [{"place": each.place, "uncertainty": each.uncertainty} for each in places[law]],
+                "deviations": [deviation(point, law) for point in rows],
+                "closest_at": sum(closest(point) == law for point in rows),
+            }
+            for law in WORDS
+        ]

@@ -28,6 +28,7 @@ from protocols.common.sine.calibration import REST, bare_calibration, end_test, 
 from protocols.common.sine.holding import Hold, capture_and_measure, prepared
 from protocols.common.sine.pace import Pace
 from protocols.common.sine.settling import Held, Report, Settled, settle_and_measure
+from protocols.stability.laws import LawPrediction, implied, law_prediction, predicted_columns
 from protocols.stability.prediction import Predicted, close_pair, predicted, rocking
 from protocols.stability.protocol import OrbitStatus, StabilityParameters, StabilityPoint
 from protocols.stability.release import Released, combined, parts_of, release
@@ -53,11 +54,12 @@ class Place:
 
 @dataclass(frozen=True)
 class _Trial:
-    """A motion to be held: its point, sine, prediction and stabiliser."""
+    """A motion to be held: its point, sine, prediction, also under other laws of restitution, and stabiliser."""
 
     place: Place
     sine: Sine
     predicted: Predicted
+    under: LawPrediction
     design: StabiliserDesign
 
 
@@ -167,7 +169,11 @@ class StabilityPlan:
             )
             return StabilityPoint(**fields, status=OrbitStatus.NOT_HELD, reason=reason)
         found = predicted(orbit, configuration.known_on_table, shaker, p.harmonics)
-        fields |= {**_predicted_fields(found), "reason": close_pair(orbit)}
+        under = law_prediction(
+            orbit, found.multiplier, configuration.known_on_table, shaker, p.harmonics, p.impulse_offset
+        )
+        by_law = {name: _or_none(value) for name, value in predicted_columns(under).items()}
+        fields |= {**_predicted_fields(found), **by_law, "reason": close_pair(orbit)}
         sine = Sine(place.omega, amplitude, calibration)
         falls, last = 0, StabilityPoint(**fields, status=OrbitStatus.OVERTURNED)
         for tried, start in enumerate(starts, 1):
@@ -177,7 +183,7 @@ class StabilityPlan:
             yield Calibrate(calibration)
             point: StabilityPoint | Fallen = Fallen()
             if not isinstance((yield Sweep(start.segments)), Fallen):
-                point = yield from self._held_point(_Trial(place, sine, found, design), fields, where)
+                point = yield from self._held_point(_Trial(place, sine, found, under, design), fields, where)
             yield from end_test(specimen, fast=isinstance(point, Fallen))
             if isinstance(point, Fallen):
                 falls += 1
@@ -244,6 +250,7 @@ class StabilityPlan:
                 "angle_rad": found.angle,
                 "angle_uncertainty_rad": COVERAGE * hypot(found.angle_uncertainty, turned if turned == turned else 0.0),
                 "agrees": apart <= hypot(expanded, expected) if expected == expected else None,
+                **implied(trial.under, self._specimen.block.restitution_factor, found.modulus, expanded),
                 "uncertainty_parts": dumps({name: float(f"{part:.4g}") for name, part in parts.items()}),
                 "released_cycles": found.cycles,
                 "pairs": found.pairs,
@@ -267,16 +274,17 @@ class StabilityPlan:
 
 
 def _predicted_fields(found: Predicted) -> dict[str, Any]:
-    def known(value: float) -> float | None:
-        return value if value == value else None
-
     return {
         "modulus_predicted": abs(found.multiplier),
-        "modulus_predicted_uncertainty": known(COVERAGE * found.uncertainty),
+        "modulus_predicted_uncertainty": _or_none(COVERAGE * found.uncertainty),
         "angle_predicted_rad": abs(phase(found.multiplier)),
         "fixed_modulus": abs(found.fixed),
-        "amplitude_slope": known(found.slope),
+        "amplitude_slope": _or_none(found.slope),
     }
+
+
+def _or_none(value: float) -> float | None:
+    return value if value == value else None
 
 
 def _text(omega: float, factor: float) -> str:

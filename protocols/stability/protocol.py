@@ -51,6 +51,16 @@ class StabilityParameters(SineParameters, StabilityPoints):
         le=0.5,
     )
 
+    impulse_offset: float | None = quantity(
+        None,
+        "1",
+        "distance of the impulse from the middle of the base, relative to the half width, in the prediction for an "
+        "impact over a contact region; if absent, 1/3, of an impulse distributed like the velocity of approach",
+        gt=0,
+        le=1,
+        example=0.5,
+    )
+
     @model_validator(mode="after")
     def _check_axes(self) -> "StabilityParameters":
         if len(self.omega) > 1 and len(self.amplitude_factor) > 1:
@@ -99,6 +109,21 @@ class StabilityPoint(Parameters):
     )
     angle_predicted_rad: float | None = quantity(None, "rad", "predicted argument of the multiplier")
     fixed_modulus: float | None = quantity(None, "1", "predicted modulus on fixed ground")
+    consecutive_modulus: float | None = quantity(
+        None, "1", "predicted modulus with consecutive impacts at the middle and the corner of the base"
+    )
+    contact_modulus: float | None = quantity(
+        None, "1", "predicted modulus with an impulse in a contact region, at the distance impulse_offset"
+    )
+    law_modulus_uncertainty: float | None = quantity(
+        None,
+        "1",
+        f"{_EXPANDED} of a modulus that is predicted with an exact law of restitution, due to the rest of the specimen",
+    )
+    implied_factor: float | None = quantity(
+        None, "1", "restitution factor with which the prediction would be the measured modulus, to first order"
+    )
+    implied_factor_uncertainty: float | None = quantity(None, "1", f"{_EXPANDED} of this factor")
     agrees: bool | None = quantity(
         None,
         "1",
@@ -149,6 +174,9 @@ PROTOCOL = Protocol(
             "angle_rad": "angle of μ",
             "modulus_predicted": "predicted |μ|",
             "angle_predicted_rad": "predicted angle of μ",
+            "consecutive_modulus": "|μ| with consecutive impacts",
+            "contact_modulus": "|μ| with a contact region",
+            "implied_factor": "implied restitution factor",
         },
         matrix=(Axis("amplitude_factor", "amplitude_factor", "A {:g}"), Axis("omega", "omega_rad_s", "{:g} rad/s")),
         live=deferred("protocols.stability.live:multiplier_view"),

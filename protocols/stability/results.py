@@ -14,9 +14,10 @@ from bench.datafile.tables import arrays
 from bench.document.campaign import Campaign
 from bench.document.document import Column, Listing, Part, Picture, Section, Table
 from bench.document.typography import plain, typeset, with_uncertainty
-from bench.figures.style import BLACK, BLUE, GREY, VERMILLION, new_figure, set_grid
+from bench.figures.style import BLACK, BLUE, GREEN, GREY, VERMILLION, new_figure, set_grid
 from bench.figures.text_table import TextColumn, text_table
 from protocols.common.budgets import budget_parts, budgeted
+from protocols.stability.laws import HOUSNER, WORDS, law_texts
 from protocols.stability.prediction import Boundary, boundaries
 from protocols.stability.protocol import StabilityPoint
 
@@ -27,6 +28,11 @@ if TYPE_CHECKING:
 Curve = Mapping[str, NDArray[Any]]
 
 ABSENT = "-"
+
+LAWS = (
+    "laws of restitution (normalised deviation: measured minus predicted, divided by the combined expanded "
+    "uncertainty; the restitution is exact):"
+)
 
 _COLUMNS = (
     TextColumn("omega", "rad/s"),
@@ -72,6 +78,8 @@ def stability_table(points: Sequence[StabilityPoint], curve: Curve) -> str:
         return "No point was measured."
     rows = sorted(points, key=lambda point: (point.omega_rad_s, point.amplitude_factor))
     lines = [text_table(_COLUMNS, map(_cells, rows)), "", *boundary_texts(rows, curve)]
+    if laws := laws_texts(rows, curve):
+        lines += ["", LAWS, *laws, ""]
     lines += [
         f"{point.omega_rad_s:g} rad/s, amplitude factor {point.amplitude_factor:g}: {point.reason}"
         for point in rows
@@ -100,6 +108,11 @@ def boundary_texts(points: Sequence[StabilityPoint], curve: Curve) -> list[str]:
             text = ", ".join(f"{place:.4f}{unit}" for place in places) or "none in this range"
             lines.append(f"predicted boundary {words}: {text}")
     return lines
+
+
+def laws_texts(points: Sequence[StabilityPoint], curve: Curve) -> list[str]:
+    """Statements on the laws of restitution."""
+    return law_texts(points, measured_boundaries(points), curve, "" if by_amplitude(points) else " rad/s")
 
 
 def _cells(point: StabilityPoint) -> list[str]:
@@ -144,6 +157,9 @@ def _draw_moduli(panel: "Axes", points: Sequence[StabilityPoint], curve: Curve) 
     ):
         if np.isfinite(curve[f"{ground}_modulus"]).any():
             panel.plot(places, curve[f"{ground}_modulus"], color=colour, linestyle=dash, linewidth=1.4, label=label)
+    for (law, words), dash in zip(WORDS.items(), ("-", ":", "-."), strict=True):
+        if law != HOUSNER and f"{law}_modulus" in curve:
+            panel.plot(places, curve[f"{law}_modulus"], color=GREEN, linestyle=dash, linewidth=1.0, label=words)
     for number, each in enumerate(measured_boundaries(points)):
         panel.axvspan(each.place - each.uncertainty, each.place + each.uncertainty, color=GREY, alpha=0.35, lw=0)
         label = "_" if number else "measured boundary (k = 2)"
@@ -206,6 +222,8 @@ def stability_sections(campaign: Campaign) -> list[Section]:
     )
     parts.append(Picture(stability_figure(points, curve), caption, "Multipliers against frequency or amplitude."))
     parts.append(_points_table(points))
+    if laws := laws_texts(points, curve):
+        parts += [typeset(LAWS), Listing([typeset(text) for text in laws])]
     budgets = [
         each
         for point in points

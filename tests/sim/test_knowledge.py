@@ -121,3 +121,31 @@ def test_deviations_leave_of_a_linear_result_exactly_its_variance(slopes: list[f
     pairs = known.deviations(BEST)
     found = sum((0.5 * float(g @ (np.array(numbers(a)) - numbers(b)))) ** 2 for a, b in pairs)
     assert found == pytest.approx(float(g @ known.identified.covariance(names) @ g), rel=1e-7, abs=1e-18)
+
+
+def test_a_propagated_uncertainty_is_that_of_the_deviations_of_a_linear_result() -> None:
+    slopes = {
+        "m1": 2.0,
+        "m2": -1.0,
+        "k1": 1.0,
+        "k2": -3.0,
+        "xi1": 0.1,
+        "xi2": 0.2,
+        "restitution_factor": 5.0,
+        "k_c": 0.7,
+    }
+
+    def result(specimen: Specimen) -> float:
+        frame, block = specimen.frame, specimen.block
+        values = {**frame.model_dump(), **block.model_dump(), "k_c": specimen.k_c}
+        return float(sum(slope * values[name] / best[name] for name, slope in slopes.items()))
+
+    best = {**BEST.frame.model_dump(), **BEST.block.model_dump(), "k_c": BEST.k_c}
+    uncertainty, parts = MEASURED.propagated(BEST, slopes)
+    sides = [result(one) - result(other) for one, other in MEASURED.deviations(BEST)]
+    assert uncertainty == pytest.approx(0.5 * np.hypot.reduce(sides), rel=1e-9)
+    # without the correlations it would be another
+    assert uncertainty != pytest.approx(np.hypot.reduce(list(parts.values())), rel=0.05)
+    assert list(parts.values()) == sorted(parts.values(), reverse=True)
+    assert parts["k1"] == pytest.approx(2.0 / 210.0)
+    assert "m2" not in parts

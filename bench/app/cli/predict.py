@@ -210,8 +210,10 @@ stability = _sine(
     "Frequencies at which rocking motions become stable or unstable, on fixed ground and on a table.\n\n"
     "The block pushes the table, which changes how a disturbance grows or decays: a motion may be stable on the table "
     "and unstable on fixed ground. The drive keeps the table's motion a pure sine up to the harmonic --harmonics, but "
-    "does not react within a period. The boundaries are listed; --csv, --json and --plot contain the multipliers of "
-    "every point.",
+    "does not react within a period. The boundaries are listed with their uncertainty due to the specimen and their "
+    "sensitivities to its parameters, the amplitude and the mass of the table; --csv, --json and --plot contain the "
+    "multipliers of every point. With several amplitudes, the figure shows the boundaries against stiffness, or "
+    "against amplitude for a single stiffness.",
 )
 attractor = _sine(
     AttractorRequest,

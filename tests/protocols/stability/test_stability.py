@@ -49,6 +49,18 @@ def test_the_multiplier_of_an_unstable_orbit(unstable: dict[str, Any]) -> None:
     assert 2.0 * np.hypot(*parts.values()) == pytest.approx(unstable["modulus_uncertainty"], rel=1e-3)
 
 
+def test_the_laws_of_restitution_are_compared(unstable: dict[str, Any], folder: Path) -> None:
+    """The bench has Housner's restitution."""
+    expected = unstable["modulus_predicted"]
+    assert expected < unstable["consecutive_modulus"] < unstable["contact_modulus"]
+    assert abs(unstable["implied_factor"] - 1.0) < unstable["implied_factor_uncertainty"]
+    laws = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["restitution_laws"]
+    assert [law["law"] for law in laws] == ["housner", "consecutive", "contact"]
+    assert [law["closest_at"] for law in laws] == [1, 0, 0]
+    assert [law["restitution"] for law in laws] == pytest.approx([254.0 / 260.0, 257.0 / 260.0, 256.0 / 258.0])
+    assert abs(laws[0]["deviations"][0]) < abs(laws[1]["deviations"][0]) < abs(laws[2]["deviations"][0])
+
+
 def test_the_deviation_grows_after_the_release_without_control(unstable: dict[str, Any], folder: Path) -> None:
     with open_datafile(folder / "campaign.h5") as record:
         cycles = record.columns_of(HoldCycle)
@@ -70,6 +82,7 @@ def test_report_and_replay(unstable: dict[str, Any], folder: Path, capsys: pytes
     assert not faults(texts)
     assert any("Stability of the rocking orbits" in text for _, text in texts)
     assert any(f"{unstable['modulus']:.3f}" in text for _, text in texts)
+    assert any("closest at 1 of 1 points" in text for _, text in texts)
 
 
 @pytest.mark.soak
