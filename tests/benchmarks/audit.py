@@ -7,7 +7,7 @@
 
 `NAMES` are studies or beginnings of their names, such as `frame` or "alpha_2, default". The benches are carried out in
 rounds of `ROUND` of each study, those with little cost first, and are stored in a JSON file (`--results`) every few
-seconds, so that an interrupted audit is resumed. After a change of an estimate or a budget, its studies have to be done anew.
+seconds, so that an interrupted audit is resumed. After a change of an estimate or its budget, use `--anew`.
 """
 
 import argparse
@@ -30,7 +30,7 @@ PAGE = ROOT / "docs" / "accuracy.md"
 COMMAND = "python -m tests.benchmarks.audit --write"
 BEGIN, END = f"<!-- written by `{COMMAND}`: do not edit -->", "<!-- end of the written table -->"
 
-ROUND = 20
+ROUND = 10
 """Benches of every study before any has more."""
 
 STORED_AFTER = 10.0

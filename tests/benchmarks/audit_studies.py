@@ -6,7 +6,15 @@ from functools import partial
 from math import degrees
 
 from bench.analysis.free_decay.response import NAMES
-from tests.benchmarks import coverage, coverage_record, identify_block, identify_frame, multipliers
+from tests.benchmarks import (
+    check_delays,
+    coverage,
+    coverage_record,
+    identify_block,
+    identify_frame,
+    multipliers,
+    table_response,
+)
 from tests.benchmarks.coverage_sensors import CASES
 from tests.benchmarks.estimates import Estimate, Omitted
 
@@ -65,7 +73,7 @@ def _harmonic(seed: int, case: str, omega: float, beta: float) -> Outcome:
     return found if isinstance(found, Omitted) else {"alpha_2": found.estimate}
 
 
-RECORDS = (("l-aquila", 0.25), ("l-aquila", 0.97), ("pacoima", 0.64), ("parkfield", 0.64))
+RECORDS = (("l-aquila", 0.25), ("l-aquila", 0.97), ("pacoima", 0.25), ("pacoima", 0.97))
 """Synthetic records and stiffness ratios of the peak drift ratio."""
 
 
@@ -100,6 +108,13 @@ MULTIPLIERS = ((15.0, 0.97), (15.6, 0.97), (12.5, 0.64))
 def _multiplier(seed: int, omega: float, beta: float) -> Outcome:
     found = multipliers.released(omega, beta, seed, 0.04, ["--starts", "3"])
     return found if isinstance(found, Omitted) else {"modulus": found.modulus, "angle": found.angle}
+
+
+CHECK = {
+    "accelerometer": "delay of the accelerometer",
+    "laser_1": "delay of laser 1",
+    "lasers": "delay of laser 2 against laser 1",
+}
 
 
 def studies() -> dict[str, Study]:
@@ -142,5 +157,16 @@ def studies() -> dict[str, Study]:
             {"modulus": ("", 1.0), "angle": ("°", degrees(1.0))},
         )
         for omega, beta in MULTIPLIERS
+    ]
+    found += [
+        _study(
+            "table",
+            "identification of a table without friction",
+            {key: f"response, {key}" for place in table_response.PLACES for key in table_response.keys(place)},
+            table_response.responses,
+            1.8,
+            {table_response.keys(place)[1]: ("mrad", 1e3) for place in table_response.PLACES},
+        ),
+        _study("check", "`check`, lasers at 4 kHz", CHECK, check_delays.delays, 0.8, dict.fromkeys(CHECK, ("µs", 1e6))),
     ]
     return {each.name: each for each in found}
