@@ -77,8 +77,8 @@ RECORDS = (("l-aquila", 0.25), ("l-aquila", 0.97), ("pacoima", 0.25), ("pacoima"
 """Synthetic records and stiffness ratios of the peak drift ratio."""
 
 
-def _record(seed: int, name: str, beta: float, calibrated: bool) -> Outcome:
-    return {"alpha_2": coverage_record.measured(seed, name, beta, calibrated=calibrated).estimate}
+def _record(seed: int, name: str, beta: float, case: str) -> Outcome:
+    return {"alpha_2": coverage_record.measured(seed, name, beta, CASES[case]).estimate}
 
 
 FRAME = {"k1": "k₁", "k2": "k₂", "xi1": "ξ₁", "xi2": "ξ₂", "omega1": "ω₁", "omega2": "ω₂"}
@@ -133,13 +133,13 @@ def studies() -> dict[str, Study]:
     ]
     found += [
         _study(
-            f"record, {'calibrated' if calibrated else 'default'}, {name}, {beta:g}",
-            f"synthetic {name}, β {beta:.2f}, {'with `laser-calibration`' if calibrated else 'default lasers'}",
+            f"record, {case}, {name}, {beta:g}",
+            f"synthetic {name}, β {beta:.2f}, {HARMONIC[case][0]}",
             alpha_2,
-            partial(_record, name=name, beta=beta, calibrated=calibrated),
-            3.5 if calibrated else 0.3,
+            partial(_record, name=name, beta=beta, case=case),
+            3.5 if case == "calibrated" else 0.3,
         )
-        for calibrated, records in ((False, RECORDS), (True, RECORDS[:1]))
+        for case, records in (("default", RECORDS), ("short waves", RECORDS[::3]), ("calibrated", RECORDS[:1]))
         for name, beta in records
     ]
     found += [

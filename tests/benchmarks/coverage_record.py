@@ -16,7 +16,7 @@ from protocols.harmonic.protocol import HarmonicParameters
 from sim.excitation import SampledRecord
 from sim.rocking import simulate
 from sim.specimen import Specimen
-from tests.benchmarks.coverage_sensors import ACCURACY, CASES, RANGES, RATE, REST, Array, Motion, Sensors
+from tests.benchmarks.coverage_sensors import ACCURACY, CASES, RANGES, RATE, REST, Array, Case, Motion, Sensors
 from tests.benchmarks.estimates import Estimate, Statistics
 
 LOWEST, STRENGTH = 0.8, 1.3
@@ -58,11 +58,11 @@ class Measured:
     parts: dict[str, float]
 
 
-def measured(seed: int, name: str, beta: float, *, calibrated: bool = False) -> Measured:
+def measured(seed: int, name: str, beta: float, case: Case) -> Measured:
     """The peak drift ratio of one bench, coupled over bare; the true one is that of the motions."""
     bare, coupled = motion_under(name, None), motion_under(name, beta)
-    sensors = Sensors(seed, CASES["calibrated" if calibrated else "default"])
-    found = sensors.calibrated() if calibrated else None
+    sensors = Sensors(seed, case)
+    found = sensors.calibrated() if case.calibrated else None
     seen = [observe(sensors.signals(motion, found), REST, RATE).drift for motion in (bare, coupled)]
     drawn = drift_errors((seen[0], seen[1]), SensorUncertainty(ACCURACY, RANGES, found), DRAWS, seed)
     together = np.sum(list(drawn.values()), axis=0)
@@ -79,10 +79,10 @@ def _scatter(errors: Array) -> float:
 
 
 def seismic(trials: int, name: str) -> None:
-    for calibrated in (False, True):
-        print("\nwith a calibration" if calibrated else "\nby the data sheets alone")
+    for case in (CASES["default"], CASES["calibrated"]):
+        print("\nwith a calibration" if case.calibrated else "\nby the data sheets alone")
         for beta in HarmonicParameters().beta:
-            rows = [measured(seed, name, beta, calibrated=calibrated) for seed in range(trials)]
+            rows = [measured(seed, name, beta, case) for seed in range(trials)]
             largest = Counter(max(row.parts, key=lambda part: row.parts[part]) for row in rows)
             found = Statistics.of([row.estimate for row in rows])
             print(
