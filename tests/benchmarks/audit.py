@@ -125,7 +125,7 @@ HEADING = (
 
 def table(asked: Iterable[Study], results: Stored) -> list[str]:
     """Lines of the table for the studies of which benches are stored."""
-    lines, last = list(HEADING), ""
+    lines = list(HEADING)
     for study in asked:
         outcomes = list(results.get(study.name, {}).values())
         measured = [one for one in outcomes if not isinstance(one, Omitted)]
@@ -133,8 +133,7 @@ def table(asked: Iterable[Study], results: Stored) -> list[str]:
         for key, symbol in study.quantities.items():
             if len(measured) > 1:
                 found = Statistics.of([one[key] for one in measured])
-                shown = "" if (symbol, study.case) == last else symbol
-                lines.append(f"| {shown or symbol} | {study.case} | {_row(study, key, found, omitted)} |")
+                lines.append(f"| {symbol} | {study.case} | {_row(study, key, found, omitted)} |")
     return lines
 
 
@@ -146,12 +145,16 @@ def _row(study: Study, key: str, found: Statistics, omitted: int) -> str:
     mark = "**" if found.conspicuous else ""
     parts = (
         f"{found.n} ({omitted})" if omitted else f"{found.n}",
-        f"{expanded:.2g} {unit}".strip(),
+        f"{_two_digits(expanded)} {unit}".strip(),
         f"{mark}{covered}{mark}",
         f"{mark}{rms}{mark}",
         f"{found.mean:+.2f}".replace("-", "−"),
     )
     return " | ".join(parts)
+
+
+def _two_digits(number: float) -> str:
+    return f"{number:.0f}" if number >= 100.0 else f"{number:#.2g}".removesuffix(".")
 
 
 def with_table(page: str, lines: Sequence[str]) -> str:
