@@ -61,7 +61,7 @@ def _normal(seed: int, size: float = 1.0) -> Outcome:
     return {"x": Estimate(3.0 + 0.1 * size * float(np.random.default_rng(seed).standard_normal()), 0.1, 3.0)}
 
 
-MADE = Study("made, normal", "made", {"x": "x"}, _normal, 0.1, {})
+MADE = Study("made, normal", "made", {"x": "x"}, _normal, 0.1)
 
 
 def test_bounds_pass_honest_intervals_with_the_stated_probability_and_fail_others() -> None:

@@ -1,7 +1,7 @@
 """Studies of the audit: each measures quantities of one drawn bench after another, whose true values are known."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from math import degrees
 
@@ -36,18 +36,7 @@ class Study:
     quantities: Mapping[str, str]
     bench: Callable[[int], Outcome]
     seconds: float
-    units: Mapping[str, tuple[str, float]]
-
-
-def _study(
-    name: str,
-    case: str,
-    quantities: Mapping[str, str],
-    bench: Callable[[int], Outcome],
-    seconds: float,
-    units: Mapping[str, tuple[str, float]] | None = None,
-) -> Study:
-    return Study(name, case, quantities, bench, seconds, units or {})
+    units: Mapping[str, tuple[str, float]] = field(default_factory=dict[str, tuple[str, float]])
 
 
 MORE_POINTS = ((15.0, 0.25), (15.0, 0.64), (17.5, 0.64), (20.0, 0.97))
@@ -121,7 +110,7 @@ def studies() -> dict[str, Study]:
     """All studies by name, in the order of the table."""
     alpha_2 = {"alpha_2": "α₂"}
     found = [
-        _study(
+        Study(
             f"alpha_2, {case}, {omega:g}, {beta:g}",
             f"({omega:g}, {beta:.2f}), {text}",
             alpha_2,
@@ -132,7 +121,7 @@ def studies() -> dict[str, Study]:
         for omega, beta in points
     ]
     found += [
-        _study(
+        Study(
             f"record, {case}, {name}, {beta:g}",
             f"synthetic {name}, β {beta:.2f}, {HARMONIC[case][0]}",
             alpha_2,
@@ -143,12 +132,12 @@ def studies() -> dict[str, Study]:
         for name, beta in records
     ]
     found += [
-        _study("frame, pulse", "pulse, one decay", FRAME | {"k_c": "k_C"}, partial(_frame, excitation="pulse"), 6.5),
-        _study("frame, hand", "release by hand, one decay", FRAME, partial(_frame, excitation="hand"), 6.4),
-        _study("block", "free rocking, 6 tilts", BLOCK, _block, 2.5, {"trend": ("10⁻⁶/rad", 1e6)}),
+        Study("frame, pulse", "pulse, one decay", FRAME | {"k_c": "k_C"}, partial(_frame, excitation="pulse"), 6.5),
+        Study("frame, hand", "release by hand, one decay", FRAME, partial(_frame, excitation="hand"), 6.4),
+        Study("block", "free rocking, 6 tilts", BLOCK, _block, 2.5, {"trend": ("10⁻⁶/rad", 1e6)}),
     ]
     found += [
-        _study(
+        Study(
             f"multiplier, {omega:g}, {beta:g}",
             f"({omega:g}, {beta:.2f})",
             {"modulus": "|μ|", "angle": "angle of μ"},
@@ -159,7 +148,7 @@ def studies() -> dict[str, Study]:
         for omega, beta in MULTIPLIERS
     ]
     found += [
-        _study(
+        Study(
             "table",
             "identification of a table without friction",
             {key: f"response, {key}" for place in table_response.PLACES for key in table_response.keys(place)},
@@ -167,6 +156,6 @@ def studies() -> dict[str, Study]:
             1.8,
             {table_response.keys(place)[1]: ("mrad", 1e3) for place in table_response.PLACES},
         ),
-        _study("check", "`check`, lasers at 4 kHz", CHECK, check_delays.delays, 0.8, dict.fromkeys(CHECK, ("µs", 1e6))),
+        Study("check", "`check`, lasers at 4 kHz", CHECK, check_delays.delays, 0.8, dict.fromkeys(CHECK, ("µs", 1e6))),
     ]
     return {each.name: each for each in found}

@@ -88,10 +88,6 @@ class Bench:
     calibration: LaserCalibration | None
 
 
-NOT_STABLE = Omitted("not stable")
-NOT_STEADY = Omitted("not steady")
-
-
 def bench(seed: int, case: Case, omega: float, beta: float) -> Bench | Omitted:
     """Both tests of a bench; omitted where the true motion is not stable, or does not become steady."""
     random, sensors = np.random.default_rng([seed, 3]), Sensors(seed, case)
@@ -101,7 +97,7 @@ def bench(seed: int, case: Case, omega: float, beta: float) -> Bench | Omitted:
     true = omega / (1.0 + case.clock)
     branch = predict_gain(specimen, true, LEVEL).rocking
     if branch is None or not branch.stable:
-        return NOT_STABLE
+        return Omitted("not stable")
     found = calibration_of(seed, case) if case.calibrated else None
     phase, *start = (float(value) for value in branch.orbit.section)
     moved = np.array([*start[:4], 0.0, start[4]])
@@ -120,7 +116,7 @@ def bench(seed: int, case: Case, omega: float, beta: float) -> Bench | Omitted:
             return Omitted("fell")
         test = _observed(motion, cycles_of(sensors.signals(motion, found), omega), omega)
         if test is None:
-            return NOT_STEADY
+            return Omitted("not steady")
         tests.append(test)
     scale = sensors.table * (found.table_acceleration if found else 1.0)
     return Bench(omega, specimen, case.clock, scale, *tests, found)

@@ -31,7 +31,7 @@ from protocols.stability.protocol import StabilityPoint
 from protocols.stability.results import measured_boundaries
 from sim.specimen import Specimen
 from sim.table_orbit import table_orbit
-from tests.benchmarks.estimates import Estimate, Omitted
+from tests.benchmarks.estimates import Estimate, Omitted, Statistics
 from tests.benchmarks.hold import configured, drawn
 
 SCALE = 0.005
@@ -123,15 +123,13 @@ def of_points(asked: argparse.Namespace) -> None:
                 flush=True,
             )
         if found:
-            moduli, angles = (np.array([getattr(one, name) for one in found]) for name in ("modulus", "angle"))
-            (off, inside), (turned, within) = (
-                (np.abs(each[:, 0] - each[:, 2]), np.abs(each[:, 0] - each[:, 2]) <= 2.0 * each[:, 1])
-                for each in (moduli, angles)
-            )
+            moduli, angles = ([getattr(one, name) for one in found] for name in ("modulus", "angle"))
+            off, turned = (np.array([abs(each.value - each.truth) for each in one]) for one in (moduli, angles))
+            inside, within = (Statistics.of(one).covered for one in (moduli, angles))
             print(
                 f"{text}: measured {len(found)} of {asked.seeds}; |mu| within 0.005 {np.mean(off <= 0.005):.0%}, "
-                f"within U {np.mean(inside):.0%}, rms {np.sqrt(np.mean(off**2)):.5f}; angle within "
-                f"1 deg {np.mean(turned <= np.radians(1.0)):.0%}, within U {np.mean(within):.0%}; "
+                f"within U {inside:.0%}, rms {np.sqrt(np.mean(off**2)):.5f}; angle within "
+                f"1 deg {np.mean(turned <= np.radians(1.0)):.0%}, within U {within:.0%}; "
                 f"not measured {failed}, another pair slower {sum(one.exchanged for one in found)}",
                 flush=True,
             )
