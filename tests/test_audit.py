@@ -146,5 +146,6 @@ def test_the_page_has_rows_of_declared_studies_only() -> None:
     text = audit.PAGE.read_text(encoding="utf-8").split(audit.BEGIN)[1].split(audit.END)[0]
     rows = [tuple(cell.strip() for cell in line.split("|")[1:3]) for line in text.splitlines() if line.startswith("| ")]
     declared = [(symbol, one.case) for one in studies().values() for symbol in one.quantities.values()]
+    assert not any("|" in cell for row in declared for cell in row)
     assert rows[1:] == [row for row in declared if row in rows]
     assert len(rows) > 30

@@ -140,7 +140,7 @@ def studies() -> dict[str, Study]:
         Study(
             f"multiplier, {omega:g}, {beta:g}",
             f"({omega:g}, {beta:.2f})",
-            {"modulus": "|μ|", "angle": "angle of μ"},
+            {"modulus": "modulus of μ", "angle": "angle of μ"},
             partial(_multiplier, omega=omega, beta=beta),
             5.0,
             {"modulus": ("", 1.0), "angle": ("°", degrees(1.0))},
