@@ -63,7 +63,7 @@ WORDING = 8
 same version.
 """
 
-INTERVALS = 2
+INTERVALS = 3
 """Version of the evaluation of uncertainties. Replay compares uncertainties only with those of a file of the same
 version.
 """

@@ -1,7 +1,7 @@
 """Lines of the loop check that compare the sensors under a common motion."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf, isinf
 
 import numpy as np
@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from bench.analysis.check_line import CheckLine, judged, stated
 from bench.analysis.gain import COVERAGE
+from bench.analysis.uncertainty import student_factor
 from bench.config.model import BenchConfiguration
 from drivers.timebase.common_motion import CommonMotion, common_motion
 from protocols.check.protocol import CheckParameters
@@ -100,9 +101,9 @@ def table_delay_lines(
     """
     if parameters.delay_tolerance is None:
         return
-    pair = _delay_between(sines.omega, sines.displacement, sines.accelerometer)
+    pair = delay_between(sines.omega, sines.displacement, sines.accelerometer)
     storeys = dict(zip(STOREYS, (sines.storey_1, sines.storey_2), strict=True)) if lasers else {}
-    against = {name: _delay_between(sines.omega, sines.accelerometer, seen) for name, seen in storeys.items()}
+    against = {name: delay_between(sines.omega, sines.accelerometer, seen) for name, seen in storeys.items()}
     middle = float(np.mean([one.delay for one in against.values()])) if against else np.nan
     # the lasers lag behind the correct sensor only by their latency, so the sensor nearer to them is assumed correct
     alone = TABLE_ACCELERATION if abs(middle + pair.delay) < abs(middle) else TABLE_DISPLACEMENT
@@ -132,9 +133,13 @@ def _allowed_of_table(tolerance: float, sample_rate: float) -> tuple[float, floa
     return -tolerance, tolerance + 0.5 / sample_rate
 
 
-def _delay_between(omega: NDArray[np.float64], first: Amplitudes, second: Amplitudes) -> CommonMotion:
+def delay_between(omega: NDArray[np.float64], first: Amplitudes, second: Amplitudes) -> CommonMotion:
+    """Delay of the second signal against the first; its standard uncertainty follows Student's t, since the scatter of
+    few phases about a line determines it only roughly.
+    """
     # the amplitudes are for exp(-i omega t), those of `common_motion` for exp(+i omega t)
-    return common_motion(omega, first.conj(), second.conj())
+    found = common_motion(omega, first.conj(), second.conj())
+    return replace(found, uncertainty=student_factor(omega.size) * found.uncertainty)
 
 
 def scale_lines(sines: Sines, parameters: CheckParameters, *, lasers: bool) -> Iterator[CheckLine]:
@@ -184,7 +189,7 @@ def delay_lines(sines: Sines, parameters: CheckParameters, configuration: BenchC
     most = allowed_delay(configuration.known_specimen, parameters.highest_omega, parameters.u1_error)
     hardware = configuration.hardware.lasers
     settable = configuration.backend == "hardware" and hardware.connection == "serial"
-    found = [_delay_between(omega, sines.displacement, seen) for seen in (sines.storey_1, sines.storey_2)]
+    found = [delay_between(omega, sines.displacement, seen) for seen in (sines.storey_1, sines.storey_2)]
     difference, between = found[1].delay - found[0].delay, COVERAGE * configuration.analysis.laser_timing
     differs = _table_differs(sines, parameters, configuration.sample_rate)
     for name, motion in zip(STOREYS, found, strict=True):
@@ -226,11 +231,12 @@ def _table_differs(sines: Sines, parameters: CheckParameters, sample_rate: float
     if parameters.delay_tolerance is None:
         return False
     lowest, highest = _allowed_of_table(parameters.delay_tolerance, sample_rate)
-    return not lowest <= _delay_between(sines.omega, sines.displacement, sines.accelerometer).delay <= highest
+    return not lowest <= delay_between(sines.omega, sines.displacement, sines.accelerometer).delay <= highest
 
 
 def signed_scale(omega: NDArray[np.float64], amplitudes: Amplitudes, reference: Amplitudes) -> tuple[float, float]:
-    """Scale of one sensor relative to another, negative for opposite polarity, and its standard uncertainty.
+    """Scale of one sensor relative to another, negative for opposite polarity, and its standard uncertainty, with
+    Student's t.
 
     The magnitude is extrapolated to zero frequency with a term in omega^2: a mass on a compliant clamp moves more than
     the table, by the fraction (omega / omega_clamp)^2.
@@ -244,7 +250,8 @@ def signed_scale(omega: NDArray[np.float64], amplitudes: Amplitudes, reference: 
     spread = float(residual @ residual) / (omega.size - 2)
     # at the lowest frequency, delays rotate the ratio by less than a right angle
     sign = 1.0 if ratio[np.argmin(omega)].real >= 0.0 else -1.0
-    return sign * float(solution[0]), float(np.sqrt(spread * covariance[0, 0]))
+    # two parameters are fitted
+    return sign * float(solution[0]), student_factor(omega.size - 1) * float(np.sqrt(spread * covariance[0, 0]))
 
 
 def allowed_delay(specimen: Specimen, omega: float, error: float) -> float:

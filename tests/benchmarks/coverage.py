@@ -14,41 +14,35 @@ steady solver, and the ratio of the peaks of the simulated motions during the me
 
 import argparse
 import json
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from math import tau
 
 import numpy as np
 
-from bench.accelerograms.reference import RecordReference
 from bench.analysis.cycles import Cycle
 from bench.analysis.gain import steady_peak
 from bench.analysis.laser_calibration import LaserCalibration
 from bench.analysis.linearity import LinearFrame
 from bench.analysis.sensor_accuracy import SensorUncertainty
 from bench.analysis.steady import Steadiness, SteadyDetector
-from bench.analysis.table_motion import table_motion, with_final_rest
 from bench.config.model import BenchConfiguration
 from protocols.common.sine.settling import INTERVAL, JUDGED, LASERS, SHORTEST, TRANSIENT, Settled
-from protocols.earthquake.measurement import observe
-from protocols.earthquake.uncertainty import drift_errors
 from protocols.harmonic.judgement import Conditions, judge
 from protocols.harmonic.protocol import HarmonicParameters, HarmonicPoint, PointStatus
-from sim.excitation import SampledRecord
 from sim.gain import predict_gain
 from sim.linear import steady_response
-from sim.rocking import State, simulate
+from sim.rocking import State
 from sim.specimen import Specimen
+from tests.benchmarks.coverage_record import seismic
 from tests.benchmarks.coverage_sensors import (
     ACCURACY,
     CASES,
     LEAD,
     RANGES,
     RATE,
-    REST,
     SOURCES,
-    Array,
     Case,
     Motion,
     Sensors,
@@ -56,6 +50,7 @@ from tests.benchmarks.coverage_sensors import (
     cycles_of,
     rms,
 )
+from tests.benchmarks.estimates import Estimate, Omitted
 
 POINTS = ((16.0, 0.40), (17.5, 0.97), (20.0, 0.25), (20.0, 0.64))
 """Frequency [rad/s] and stiffness ratio."""
@@ -93,8 +88,8 @@ class Bench:
     calibration: LaserCalibration | None
 
 
-def bench(seed: int, case: Case, omega: float, beta: float) -> Bench | None:
-    """Both tests of a bench; None where the true motion is not stable, or does not become steady."""
+def bench(seed: int, case: Case, omega: float, beta: float) -> Bench | Omitted:
+    """Both tests of a bench; omitted where the true motion is not stable, or does not become steady."""
     random, sensors = np.random.default_rng([seed, 3]), Sensors(seed, case)
     specimen = NOMINAL.coupled(beta)
     if "truth" not in case.off:
@@ -102,8 +97,8 @@ def bench(seed: int, case: Case, omega: float, beta: float) -> Bench | None:
     true = omega / (1.0 + case.clock)
     branch = predict_gain(specimen, true, LEVEL).rocking
     if branch is None or not branch.stable:
-        return None
-    found = sensors.calibrated() if case.calibrated else None
+        return Omitted("not stable")
+    found = calibration_of(seed, case) if case.calibrated else None
     phase, *start = (float(value) for value in branch.orbit.section)
     moved = np.array([*start[:4], 0.0, start[4]])
     amplitudes = np.array(steady_response(specimen.bare(), true, LEVEL))
@@ -118,13 +113,22 @@ def bench(seed: int, case: Case, omega: float, beta: float) -> Bench | None:
         try:
             motion = approach(which, State.from_array(state), start_phase, omega, LEVEL, LONGEST, sensors)
         except RuntimeError:
-            return None
+            return Omitted("fell")
         test = _observed(motion, cycles_of(sensors.signals(motion, found), omega), omega)
         if test is None:
-            return None
+            return Omitted("not steady")
         tests.append(test)
     scale = sensors.table * (found.table_acceleration if found else 1.0)
     return Bench(omega, specimen, case.clock, scale, *tests, found)
+
+
+@lru_cache(maxsize=256)
+def calibration_of(seed: int, case: Case) -> LaserCalibration:
+    """What a calibration finds of the sensors of a bench: the same at all of its points."""
+    sensors = Sensors(seed, case)
+    # another noise than that of the tests
+    sensors.random = np.random.default_rng([seed, 4])
+    return sensors.calibrated()
 
 
 def _observed(motion: Motion, cycles: Sequence[Cycle], omega: float) -> Observed | None:
@@ -157,6 +161,12 @@ class Score:
     u: float
     point: HarmonicPoint
 
+    @property
+    def estimate(self) -> Estimate:
+        """alpha_2, with the gain of the true specimen at the stated amplitude."""
+        value = self.point.alpha_2 or 0.0
+        return Estimate(value, value * self.u, value / (1.0 + self.specimen))
+
 
 def _settled(test: Observed, omega: float, *, linear: bool) -> Settled:
     cycles = list(test.cycles)
@@ -184,6 +194,15 @@ def score(each: Bench) -> Score:
     )
 
 
+def scored(seed: int, case: Case, omega: float, beta: float) -> Score | Omitted:
+    """One bench, measured; omitted as well where the motion is on the other branch, which has another gain."""
+    found = bench(seed, case, omega, beta)
+    if isinstance(found, Omitted):
+        return found
+    one = score(found)
+    return one if one.point.status is PointStatus.STEADY else Omitted(one.point.status.value)
+
+
 def harmonic(benches: int, first: int, points: Sequence[tuple[float, float]], cases: Sequence[Case]) -> None:
     print(
         "case                     point          n   U [%]  covered   rms e/u  bias/u   "
@@ -191,9 +210,8 @@ def harmonic(benches: int, first: int, points: Sequence[tuple[float, float]], ca
     )
     for case in cases:
         for omega, beta in points:
-            found = [each for seed in range(first, first + benches) if (each := bench(seed, case, omega, beta))]
-            # a motion that has come to rest on the other branch is not that of the truth
-            scores = [one for each in found if (one := score(each)).point.status is PointStatus.STEADY]
+            found = [scored(seed, case, omega, beta) for seed in range(first, first + benches)]
+            scores = [one for one in found if isinstance(one, Score)]
             print(f"{case.name:24s} {omega:5.1f} {beta:5.2f}  {summary(scores)}", flush=True)
 
 
@@ -212,69 +230,6 @@ def summary(scores: Sequence[Score]) -> str:
 
 def _parts(point: HarmonicPoint) -> dict[str, float]:
     return {name: float(size) for name, size in json.loads(point.uncertainty_parts).items()}
-
-
-LOWEST, STRENGTH = 0.8, 1.3
-"""Lowest frequency of a record [Hz], and its peak over the uplift acceleration."""
-
-
-def table_record(acceleration: Array, dt: float) -> Array:
-    """What a table with a short stroke makes of a record: without the motion below LOWEST, at rest in the end."""
-    from scipy import signal
-
-    high = signal.butter(4, LOWEST, "highpass", fs=1.0 / dt, output="sos")
-    quiet = np.zeros(round(2.0 / dt))
-    return with_final_rest(signal.sosfiltfilt(high, np.concatenate((quiet, acceleration, quiet))), dt)
-
-
-def seismic(trials: int, name: str) -> None:
-    record = RecordReference.parse(f"synthetic:{name}").read()
-    specimen = Specimen()
-    acceleration = table_record(record.acceleration, record.dt)
-    acceleration *= STRENGTH * specimen.uplift_acceleration / np.abs(acceleration).max()
-    motions = {
-        beta: _under(specimen if beta is None else specimen.coupled(beta), acceleration, record.dt)
-        for beta in (None, *HarmonicParameters().beta)
-    }
-    for calibrated in (False, True):
-        print("\nwith a calibration" if calibrated else "\nby the data sheets alone")
-        for beta in HarmonicParameters().beta:
-            bare, coupled = motions[None], motions[beta]
-            true, sizes, errors, largest = coupled.drift / bare.drift, [], [], Counter[str]()
-            for seed in range(trials):
-                each = Sensors(seed)
-                one = each.calibrated() if calibrated else None
-                seen = tuple(observe(each.signals(motion, one), REST, RATE).drift for motion in (bare, coupled))
-                drawn = drift_errors((seen[0], seen[1]), SensorUncertainty(ACCURACY, RANGES, one), 4000, seed)
-                parts = {part: float(np.std((1 + e[1]) / (1 + e[0]))) for part, e in drawn.items()}
-                together = np.sum(list(drawn.values()), axis=0)
-                u = float(np.std((1.0 + together[1]) / (1.0 + together[0])))
-                largest[max(parts, key=lambda part: parts[part])] += 1
-                sizes.append(2.0 * u)
-                errors.append((seen[1].peak.value / seen[0].peak.value / true - 1.0) / u)
-            print(
-                json.dumps(
-                    {
-                        "record": name,
-                        "beta": beta,
-                        "alpha_2": round(true, 4),
-                        "U [%]": round(100.0 * float(np.mean(sizes)), 3),
-                        "largest": largest.most_common(1)[0][0],
-                        "rms error/u": round(rms(errors), 2),
-                        "held": round(float(np.mean(np.abs(errors) <= 2.0)), 3),
-                    }
-                )
-            )
-
-
-def _under(specimen: Specimen, acceleration: Array, dt: float) -> Motion:
-    t = np.arange(0.0, (acceleration.size - 1) * dt, 1.0 / RATE)
-    a = np.interp(t, np.arange(acceleration.size) * dt, acceleration)
-    moved = simulate(specimen, SampledRecord(acceleration, dt), sample_times=t, tolerance=1e-9).samples
-    assert moved is not None
-    assert len(moved) == len(t), "the block topples"
-    velocity, displacement = table_motion(a, 1.0 / RATE)
-    return Motion(displacement, velocity, a, *(moved[:, k] for k in range(4)))
 
 
 def main() -> None:

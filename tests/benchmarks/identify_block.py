@@ -32,6 +32,7 @@ from sim.free_rocking import FreeRocking, critical_angle, energy, frequency_para
 from sim.sensors import Laser
 from sim.specimen import Block, Specimen
 from sim.virtual_bench import VirtualBench, VirtualBenchParameters
+from tests.benchmarks.estimates import Estimate
 
 K = 1.959964
 """Coverage factor of 95 % for a normal distribution."""
@@ -42,8 +43,8 @@ WARM_UP = 0.1
 NAMES = ("ratio", "ratio by motion", "ratio by amplitudes", "trend", "alpha", "p")
 
 
-def repeat(seed: int, *, as_drawn: bool) -> list[tuple[float, float]]:
-    """Error and stated standard uncertainty of what `NAMES` names, for one bench."""
+def repeat(seed: int, *, as_drawn: bool) -> list[Estimate]:
+    """What `NAMES` names, for one bench."""
     random = np.random.default_rng((2027, seed))
     factor = float(random.uniform(0.98, 1.0))
     drawn = {"linearity_periods": random.uniform(*WAVES), "clock_error": random.uniform(-CLOCK, CLOCK)}
@@ -56,13 +57,13 @@ def repeat(seed: int, *, as_drawn: bool) -> list[tuple[float, float]]:
         tilts, LaserErrors(SensorAccuracy(), laser.measuring_range), asked.height, asked.height_uncertainty
     )
     theory = theoretical_restitution(nominal.block)
+    ratios = (found.restitution, found.motion, found.relation)
+    p = frequency_parameter(nominal.block, nominal.g)
     return [
-        (found.restitution.value / theory - factor, found.restitution.uncertainty / theory),
-        (found.motion.value / theory - factor, found.motion.uncertainty / theory),
-        (found.relation.value / theory - factor, found.relation.uncertainty / theory),
-        (found.trend.value, found.trend.uncertainty),
-        (found.alpha.value - critical_angle(nominal.block), found.alpha.uncertainty),
-        (found.p.value - frequency_parameter(nominal.block, nominal.g), found.p.uncertainty),
+        *(Estimate(each.value / theory, each.uncertainty / theory, factor) for each in ratios),
+        Estimate(found.trend.value, found.trend.uncertainty, 0.0),
+        Estimate(found.alpha.value, found.alpha.uncertainty, critical_angle(nominal.block)),
+        Estimate(found.p.value, found.p.uncertainty, p),
     ]
 
 
@@ -78,7 +79,7 @@ class Scattered(FreeRocking):
         return first * np.concatenate(([1.0], np.cumprod((self.restitution * (1.0 + self.drawn)) ** 2)))
 
 
-def scattered(seed: int, *, scatter: float) -> list[tuple[float, float]]:
+def scattered(seed: int, *, scatter: float) -> list[Estimate]:
     """The same as `repeat` for impacts that differ by `scatter`; the mean is 0.97."""
     random, asked, nominal = np.random.default_rng((2028, seed)), FreeRockingParameters(), Specimen()
     alpha, p = critical_angle(nominal.block), frequency_parameter(nominal.block, nominal.g)
@@ -93,9 +94,12 @@ def scattered(seed: int, *, scatter: float) -> list[tuple[float, float]]:
         taken = Recording(seen, rate, nominal.block, asked.height)
         tilts.append(analyse_tilt(taken, nominal, asked.least_swing * abs(angle)))
     found = findings(tilts, LaserErrors(SensorAccuracy(), 0.2), asked.height, asked.height_uncertainty)
-    pairs = [(each.value - r, each.uncertainty) for each in (found.restitution, found.motion, found.relation)]
+    ratios = (found.restitution, found.motion, found.relation)
     shape = [(found.trend, 0.0), (found.alpha, alpha), (found.p, p)]
-    return [(off / theory, u / theory) for off, u in pairs] + [(each.value - t, each.uncertainty) for each, t in shape]
+    return [
+        *(Estimate(each.value / theory, each.uncertainty / theory, r / theory) for each in ratios),
+        *(Estimate(each.value, each.uncertainty, truth) for each, truth in shape),
+    ]
 
 
 def _recorded(
@@ -123,7 +127,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     one = partial(scattered, scatter=given.scatter) if given.scatter else partial(repeat, as_drawn=given.as_drawn)
     with get_context("spawn").Pool(given.workers) as pool:
         rows = np.array(pool.map(one, range(given.repeats), chunksize=5))
-    error, stated = rows[:, :, 0], rows[:, :, 1]
+    error, stated = rows[:, :, 0] - rows[:, :, 2], rows[:, :, 1]
     inside = np.mean(np.abs(error) < K * stated, axis=0)
     kind = "waves and clocks drawn" if given.as_drawn else "the default laser"
     print(f"{given.repeats} benches, {f'impacts differ by {given.scatter:g}' if given.scatter else kind}")

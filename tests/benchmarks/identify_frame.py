@@ -35,6 +35,7 @@ from sim.arrangement import Arrangement
 from sim.sensors import Laser
 from sim.specimen import Frame, Specimen
 from sim.virtual_bench import VirtualBench, VirtualBenchParameters
+from tests.benchmarks.estimates import Estimate
 
 Array = NDArray[np.float64]
 
@@ -48,10 +49,9 @@ QUANTILE = 1.96
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """Errors and stated standard uncertainties of the quantities of `NAMES`, and of k_C last, relative to the truth."""
+    """The quantities of `NAMES`, and k_C last if it was measured; slopes of the damping over their uncertainties."""
 
-    errors: Array
-    stated: Array
+    estimates: list[Estimate]
     slopes: Array
 
 
@@ -68,7 +68,7 @@ def trial(seed: int, decays: int, excitation: str) -> Trial:
     bare = frame_result(
         [recorded(Arrangement(specimen)) for _ in range(decays)], setting.masses, setting.masses_covariance
     )
-    errors, stated = bare.frame.values - truth, bare.uncertainty
+    estimates = [Estimate(*each) for each in zip(bare.frame.values, bare.uncertainty, truth, strict=True)]
     if excitation == "pulse":
         held = Arrangement(specimen.with_spring(k_c), block_clamped=True)
         spring = spring_result(
@@ -76,9 +76,8 @@ def trial(seed: int, decays: int, excitation: str) -> Trial:
             frame_result([recorded(held) for _ in range(decays)], setting.masses, setting.masses_covariance),
             measured_reference(bare),
         )
-        errors, stated = np.append(errors, spring.k_c - k_c), np.append(stated, spring.uncertainty)
-        truth = np.append(truth, k_c)
-    return Trial(errors / truth, stated / truth, bare.slopes.values / bare.slope_uncertainty)
+        estimates.append(Estimate(spring.k_c, spring.uncertainty, k_c))
+    return Trial(estimates, bare.slopes.values / bare.slope_uncertainty)
 
 
 def _drawn(random: np.random.Generator) -> tuple[Frame, float]:
@@ -141,7 +140,8 @@ def main() -> None:
     with ProcessPoolExecutor(asked.processes) as pool:
         work = partial(trial, decays=asked.decays, excitation=asked.excitation)
         trials = list(pool.map(work, range(asked.first, asked.first + asked.trials)))
-    errors, stated = (np.array([getattr(one, name) for one in trials]) for name in ("errors", "stated"))
+    values, u, truth = np.moveaxis(np.array([one.estimates for one in trials]), 2, 0)
+    errors, stated = values / truth - 1.0, u / truth
     slopes = np.array([one.slopes for one in trials])
     print(f"{asked.trials} trials of {asked.decays} decays, {asked.excitation}, {time.monotonic() - began:.0f} s")
     print("quantity   in 95 %   bias/u   rms/u   mean u [%]")

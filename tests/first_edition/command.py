@@ -46,6 +46,9 @@ INTERVALS = (
 """Of gains: the remaining transient is evaluated from the cycles and the linearity of the lasers without a shape, and
 what does not agree is named in the reason."""
 
+OF_CHECK = ("uncertainty",)
+"""Of a line of a check: Student's t, since few phases determine a delay, and few ratios a scale, only roughly."""
+
 
 @dataclass(frozen=True)
 class Done:
@@ -89,7 +92,8 @@ def differences(old: object, new: object, where: str = "", rounded: Mapping[str,
     Keys in `rounded` may differ by that share of their value. Sentences may be reworded; their numbers may not change.
     """
     if isinstance(old, dict) and isinstance(new, dict):
-        for key in old.keys() - EXCEPTED - (set(INTERVALS) if "alpha_2" in old else set[str]()):
+        changed = INTERVALS if "alpha_2" in old else OF_CHECK if "what" in old and "remedy" in old else ()
+        for key in old.keys() - EXCEPTED - {*changed}:
             if key in new:
                 yield from differences(old[key], new[key], f"{where}.{key}", rounded)
             else:

@@ -20,11 +20,10 @@ from bench.control.identification import (
 )
 from bench.control.table_model import TableModel
 from sim.errors import InvalidInput
-from sim.linear import frame_matrices
 from sim.shaker import Shaker
 from sim.specimen import Frame, Specimen
 from sim.virtual_bench import VirtualBenchParameters
-from tests.bench.control.virtual_table import IDENTIFIED, RATE, bench_with, identify
+from tests.bench.control.virtual_table import IDENTIFIED, RATE, bench_with, closed_form, identify
 
 Array = NDArray[np.float64]
 
@@ -138,23 +137,7 @@ def test_the_virtual_table_against_its_own_equations() -> None:
     shaker = Shaker(friction=0.0)
     model = identify(bench_with(specimen, parameters=VirtualBenchParameters(shaker=shaker)), periods=4)
     f = np.array(model.frequency)
-    # table and storeys in absolute coordinates, the drive held between samples: discretised exactly
-    _, damping, stiffness = frame_matrices(specimen.frame)
-    relative = np.array([[-1.0, 1.0, 0.0], [-1.0, 0.0, 1.0]])
-    mass = np.array([shaker.moving_mass, specimen.frame.m1, specimen.frame.m2])
-    k = relative.T @ stiffness @ relative + np.diag([shaker.k_s, 0.0, 0.0])
-    c = relative.T @ damping @ relative + np.diag([shaker.c_s + shaker.electric_damping, 0.0, 0.0])
-    a = np.block([[np.zeros((3, 3)), np.eye(3)], [-k / mass[:, None], -c / mass[:, None]]])
-    b = np.zeros((6, 1))
-    b[3] = shaker.force_per_volt / shaker.moving_mass
-    velocity = np.zeros((1, 6))
-    velocity[0, 3] = 1.0
-    step, push, *_ = signal.cont2discrete((a, b, velocity, np.zeros((1, 1))), 1 / RATE)
-    z = np.exp(2j * np.pi * f / RATE)
-    moved = np.array([(velocity @ np.linalg.solve(zi * np.eye(6) - step, push))[0, 0] for zi in z])
-    # what the accelerometer is given is the mean over the tick before; then the filter card
-    card = signal.sosfreqz(signal.butter(4, 100.0, fs=RATE, output="sos"), 2 * np.pi * f / RATE)[1]
-    truth = moved * (1 - 1 / z) * RATE * card
+    truth = closed_form(f, shaker, specimen, RATE)
     found = model.response(f)
     assert np.abs(found / truth - 1.0).max() < 0.02
     error = np.abs(found - truth) / np.array(model.uncertainty)

@@ -5,12 +5,14 @@ from datetime import UTC, datetime
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import signal as filters
 
 from bench.control.identification import band_lines, drive_amplitudes, identify_table, multisine, steady_periods
 from bench.control.preparation import prepare
 from bench.control.table_model import TableModel
 from bench.control.target import Target
 from sim.excitation import SampledRecord
+from sim.linear import frame_matrices
 from sim.shaker import Shaker
 from sim.specimen import Specimen
 from sim.virtual_bench import VirtualBench, VirtualBenchParameters
@@ -62,6 +64,28 @@ def identify(
     return identify_table(
         np.array(drives), np.array(accelerations), lines, RATE, date=IDENTIFIED, specimen="as mounted"
     )
+
+
+def closed_form(f: Array, shaker: Shaker, specimen: Specimen, rate: float) -> NDArray[np.complex128]:
+    """Table acceleration per drive of the virtual bench with the bare frame, as its channel gives it [m/s2/V].
+
+    Table and storeys in absolute coordinates, the drive held between samples, discretised exactly; the mean over a tick
+    that the accelerometer is given; the filter card.
+    """
+    _, damping, stiffness = frame_matrices(specimen.frame)
+    relative = np.array([[-1.0, 1.0, 0.0], [-1.0, 0.0, 1.0]])
+    mass = np.array([shaker.moving_mass, specimen.frame.m1, specimen.frame.m2])
+    k = relative.T @ stiffness @ relative + np.diag([shaker.k_s, 0.0, 0.0])
+    c = relative.T @ damping @ relative + np.diag([shaker.c_s + shaker.electric_damping, 0.0, 0.0])
+    a = np.block([[np.zeros((3, 3)), np.eye(3)], [-k / mass[:, None], -c / mass[:, None]]])
+    b = np.zeros((6, 1))
+    b[3] = shaker.force_per_volt / shaker.moving_mass
+    velocity = np.eye(6)[3:4]
+    step, push, *_ = filters.cont2discrete((a, b, velocity, np.zeros((1, 1))), 1 / rate)
+    z = np.exp(2j * np.pi * f / rate)
+    moved = np.array([(velocity @ np.linalg.solve(zi * np.eye(6) - step, push))[0, 0] for zi in z])
+    card = filters.sosfreqz(filters.butter(4, 100.0, fs=rate, output="sos"), 2 * np.pi * f / rate)[1]
+    return moved * (1 - 1 / z) * rate * card
 
 
 def target_of(record: Array, dt: float, band: tuple[float, float]) -> Target:

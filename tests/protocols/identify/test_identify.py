@@ -8,8 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
-from scipy import signal
 
 from bench.app.catalogue import load_protocol
 from bench.app.preflight import compile_run
@@ -31,14 +29,12 @@ from protocols.common.identification.signal import BLOCK_SHARE, SHARE, grid, pla
 from protocols.identify.protocol import IdentifiedBand
 from sim.errors import InvalidInput
 from sim.excitation import SampledRecord
-from sim.linear import frame_matrices
 from sim.rocking import simulate
 from sim.shaker import Shaker
 from sim.specimen import Frame, Specimen
 from sim.virtual_bench import VirtualBenchParameters
+from tests.bench.control.virtual_table import closed_form
 from tests.protocols.progress import ends_at_100_percent
-
-Array = NDArray[np.float64]
 
 DAMPED = Specimen(frame=Frame(xi1=0.2, xi2=0.2))
 PROTOCOL = load_protocol("identify")
@@ -65,28 +61,6 @@ def run(
         realtime=False,
     )
     return result, events
-
-
-def closed_form(f: Array, shaker: Shaker, specimen: Specimen, rate: float) -> NDArray[np.complex128]:
-    """Table acceleration per drive of the virtual bench with the bare frame, as its channel gives it [m/s2/V].
-
-    Table and storeys in absolute coordinates, the drive held between samples, discretised exactly; the mean over a tick
-    that the accelerometer is given; the filter card.
-    """
-    _, damping, stiffness = frame_matrices(specimen.frame)
-    relative = np.array([[-1.0, 1.0, 0.0], [-1.0, 0.0, 1.0]])
-    mass = np.array([shaker.moving_mass, specimen.frame.m1, specimen.frame.m2])
-    k = relative.T @ stiffness @ relative + np.diag([shaker.k_s, 0.0, 0.0])
-    c = relative.T @ damping @ relative + np.diag([shaker.c_s + shaker.electric_damping, 0.0, 0.0])
-    a = np.block([[np.zeros((3, 3)), np.eye(3)], [-k / mass[:, None], -c / mass[:, None]]])
-    b = np.zeros((6, 1))
-    b[3] = shaker.force_per_volt / shaker.moving_mass
-    velocity = np.eye(6)[3:4]
-    step, push, *_ = signal.cont2discrete((a, b, velocity, np.zeros((1, 1))), 1 / rate)
-    z = np.exp(2j * np.pi * f / rate)
-    moved = np.array([(velocity @ np.linalg.solve(zi * np.eye(6) - step, push))[0, 0] for zi in z])
-    card = signal.sosfreqz(signal.butter(4, 100.0, fs=rate, output="sos"), 2 * np.pi * f / rate)[1]
-    return moved * (1 - 1 / z) * rate * card
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,161 @@
+"""Studies of the audit: each measures quantities of one drawn bench after another, whose true values are known."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from math import degrees
+
+from bench.analysis.free_decay.response import NAMES
+from tests.benchmarks import (
+    check_delays,
+    coverage,
+    coverage_record,
+    identify_block,
+    identify_frame,
+    multipliers,
+    table_response,
+)
+from tests.benchmarks.coverage_sensors import CASES
+from tests.benchmarks.estimates import Estimate, Omitted
+
+Outcome = Mapping[str, Estimate] | Omitted
+"""The estimates of a bench by the keys of the study's quantities."""
+
+
+@dataclass(frozen=True)
+class Study:
+    """A study of the audit.
+
+    `bench` carries out the bench of a seed. `quantities` are the symbols of its estimates by key, `case` describes it
+    in the table. `seconds` is the processor time of a bench, by which the studies are ordered. Uncertainties are
+    relative to the true value, or in `units`: symbol, and number of units in the estimate's one.
+    """
+
+    name: str
+    case: str
+    quantities: Mapping[str, str]
+    bench: Callable[[int], Outcome]
+    seconds: float
+    units: Mapping[str, tuple[str, float]] = field(default_factory=dict[str, tuple[str, float]])
+
+
+MORE_POINTS = ((15.0, 0.25), (15.0, 0.64), (17.5, 0.64), (20.0, 0.97))
+"""Further stable points of the paper's campaign."""
+
+TWO_POINTS = ((16.0, 0.40), (20.0, 0.64))
+
+HARMONIC = {
+    "default": ("default lasers", (*coverage.POINTS, *MORE_POINTS)),
+    "calibrated": ("with `laser-calibration`", coverage.POINTS),
+    "smooth": ("linearity of 0.5 to 2 periods", TWO_POINTS),
+    "short waves": ("linearity of 3 to 6 periods", coverage.POINTS),
+    "clock": ("sample clock off by 30 ppm", TWO_POINTS),
+    "amplitude drift": ("amplitude drifts by 0.2 %", TWO_POINTS),
+    "noisy laser": ("noise of laser 1 0.1 mm", TWO_POINTS),
+    "filter": ("filter cards 10 % off", TWO_POINTS),
+}
+"""Description and points of the cases of steady sines."""
+
+
+def _harmonic(seed: int, case: str, omega: float, beta: float) -> Outcome:
+    found = coverage.scored(seed, CASES[case], omega, beta)
+    return found if isinstance(found, Omitted) else {"alpha_2": found.estimate}
+
+
+RECORDS = (("l-aquila", 0.25), ("l-aquila", 0.97), ("pacoima", 0.25), ("pacoima", 0.97))
+"""Synthetic records and stiffness ratios of the peak drift ratio."""
+
+
+def _record(seed: int, name: str, beta: float, case: str) -> Outcome:
+    return {"alpha_2": coverage_record.measured(seed, name, beta, CASES[case]).estimate}
+
+
+FRAME = {"k1": "k₁", "k2": "k₂", "xi1": "ξ₁", "xi2": "ξ₂", "omega1": "ω₁", "omega2": "ω₂"}
+
+BLOCK = {
+    "ratio": "r / r_th",
+    "ratio by motion": "r / r_th, by the motion",
+    "ratio by amplitudes": "r / r_th, by the amplitudes",
+    "trend": "trend of r",
+    "alpha": "α",
+    "p": "p",
+}
+
+
+def _frame(seed: int, excitation: str) -> Outcome:
+    found = identify_frame.trial(seed, 1, excitation).estimates
+    return dict(zip((*NAMES, "k_c")[: len(found)], found, strict=True))
+
+
+def _block(seed: int) -> Outcome:
+    return dict(zip(identify_block.NAMES, identify_block.repeat(seed, as_drawn=True), strict=True))
+
+
+MULTIPLIERS = ((15.0, 0.97), (15.6, 0.97), (12.5, 0.64))
+
+
+def _multiplier(seed: int, omega: float, beta: float) -> Outcome:
+    found = multipliers.released(omega, beta, seed, 0.04, ["--starts", "3"])
+    return found if isinstance(found, Omitted) else {"modulus": found.modulus, "angle": found.angle}
+
+
+CHECK = {
+    "accelerometer": "delay of the accelerometer",
+    "laser_1": "delay of laser 1",
+    "lasers": "delay of laser 2 against laser 1",
+}
+
+
+def studies() -> dict[str, Study]:
+    """All studies by name, in the order of the table."""
+    alpha_2 = {"alpha_2": "α₂"}
+    found = [
+        Study(
+            f"alpha_2, {case}, {omega:g}, {beta:g}",
+            f"({omega:g}, {beta:.2f}), {text}",
+            alpha_2,
+            partial(_harmonic, case=case, omega=omega, beta=beta),
+            1.6 if case == "calibrated" else 0.6,
+        )
+        for case, (text, points) in HARMONIC.items()
+        for omega, beta in points
+    ]
+    found += [
+        Study(
+            f"record, {case}, {name}, {beta:g}",
+            f"synthetic {name}, β {beta:.2f}, {HARMONIC[case][0]}",
+            alpha_2,
+            partial(_record, name=name, beta=beta, case=case),
+            3.5 if case == "calibrated" else 0.3,
+        )
+        for case, records in (("default", RECORDS), ("short waves", RECORDS[::3]), ("calibrated", RECORDS[:1]))
+        for name, beta in records
+    ]
+    found += [
+        Study("frame, pulse", "pulse, one decay", FRAME | {"k_c": "k_C"}, partial(_frame, excitation="pulse"), 6.5),
+        Study("frame, hand", "release by hand, one decay", FRAME, partial(_frame, excitation="hand"), 6.4),
+        Study("block", "free rocking, 6 tilts", BLOCK, _block, 2.5, {"trend": ("10⁻⁶/rad", 1e6)}),
+    ]
+    found += [
+        Study(
+            f"multiplier, {omega:g}, {beta:g}",
+            f"({omega:g}, {beta:.2f})",
+            {"modulus": "modulus of μ", "angle": "angle of μ"},
+            partial(_multiplier, omega=omega, beta=beta),
+            5.0,
+            {"modulus": ("", 1.0), "angle": ("°", degrees(1.0))},
+        )
+        for omega, beta in MULTIPLIERS
+    ]
+    found += [
+        Study(
+            "table",
+            "identification of a table without friction",
+            {key: f"response, {key}" for place in table_response.PLACES for key in table_response.keys(place)},
+            table_response.responses,
+            1.8,
+            {table_response.keys(place)[1]: ("mrad", 1e3) for place in table_response.PLACES},
+        ),
+        Study("check", "`check`, lasers at 4 kHz", CHECK, check_delays.delays, 0.8, dict.fromkeys(CHECK, ("µs", 1e6))),
+    ]
+    return {each.name: each for each in found}

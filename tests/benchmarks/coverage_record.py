@@ -1,0 +1,100 @@
+"""Peak drift ratio under a synthetic record, as measured by drawn sensors: for `coverage` and `audit`."""
+
+import json
+from collections import Counter
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from bench.accelerograms.reference import RecordReference
+from bench.analysis.sensor_accuracy import SensorUncertainty
+from bench.analysis.table_motion import table_motion, with_final_rest
+from protocols.earthquake.measurement import observe
+from protocols.earthquake.uncertainty import drift_errors
+from protocols.harmonic.protocol import HarmonicParameters
+from sim.excitation import SampledRecord
+from sim.rocking import simulate
+from sim.specimen import Specimen
+from tests.benchmarks.coverage_sensors import ACCURACY, CASES, RANGES, RATE, REST, Array, Case, Motion, Sensors
+from tests.benchmarks.estimates import Estimate, Statistics
+
+LOWEST, STRENGTH = 0.8, 1.3
+"""Lowest frequency of a record [Hz], and its peak over the uplift acceleration."""
+
+DRAWS = 4000
+
+
+def table_record(acceleration: Array, dt: float) -> Array:
+    """What a table with a short stroke makes of a record: without the motion below LOWEST, at rest in the end."""
+    from scipy import signal
+
+    high = signal.butter(4, LOWEST, "highpass", fs=1.0 / dt, output="sos")
+    quiet = np.zeros(round(2.0 / dt))
+    return with_final_rest(signal.sosfiltfilt(high, np.concatenate((quiet, acceleration, quiet))), dt)
+
+
+@lru_cache(maxsize=16)
+def motion_under(name: str, beta: float | None) -> Motion:
+    """Motion under a synthetic record, of the specimen with the spring `beta` or of the bare frame (None)."""
+    record = RecordReference.parse(f"synthetic:{name}").read()
+    specimen = Specimen() if beta is None else Specimen().coupled(beta)
+    acceleration = table_record(record.acceleration, record.dt)
+    acceleration *= STRENGTH * specimen.uplift_acceleration / np.abs(acceleration).max()
+    t = np.arange(0.0, (acceleration.size - 1) * record.dt, 1.0 / RATE)
+    a = np.interp(t, np.arange(acceleration.size) * record.dt, acceleration)
+    moved = simulate(specimen, SampledRecord(acceleration, record.dt), sample_times=t, tolerance=1e-9).samples
+    assert moved is not None
+    assert len(moved) == len(t), "the block topples"
+    velocity, displacement = table_motion(a, 1.0 / RATE)
+    return Motion(displacement, velocity, a, *(moved[:, k] for k in range(4)))
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Measured peak drift ratio, and its standard uncertainties by contribution, relative."""
+
+    estimate: Estimate
+    parts: dict[str, float]
+
+
+def measured(seed: int, name: str, beta: float, case: Case) -> Measured:
+    """The peak drift ratio of one bench, coupled over bare; the true one is that of the motions."""
+    bare, coupled = motion_under(name, None), motion_under(name, beta)
+    sensors = Sensors(seed, case)
+    found = sensors.calibrated() if case.calibrated else None
+    seen = [observe(sensors.signals(motion, found), REST, RATE).drift for motion in (bare, coupled)]
+    drawn = drift_errors((seen[0], seen[1]), SensorUncertainty(ACCURACY, RANGES, found), DRAWS, seed)
+    together = np.sum(list(drawn.values()), axis=0)
+    ratio = seen[1].peak.value / seen[0].peak.value
+    return Measured(
+        Estimate(ratio, ratio * _scatter(together), coupled.drift / bare.drift),
+        {part: _scatter(errors) for part, errors in drawn.items()},
+    )
+
+
+def _scatter(errors: Array) -> float:
+    """Relative standard deviation of the ratio with drawn errors of both peaks, shape (2, n)."""
+    return float(np.std((1.0 + errors[1]) / (1.0 + errors[0])))
+
+
+def seismic(trials: int, name: str) -> None:
+    for case in (CASES["default"], CASES["calibrated"]):
+        print("\nwith a calibration" if case.calibrated else "\nby the data sheets alone")
+        for beta in HarmonicParameters().beta:
+            rows = [measured(seed, name, beta, case) for seed in range(trials)]
+            largest = Counter(max(row.parts, key=lambda part: row.parts[part]) for row in rows)
+            found = Statistics.of([row.estimate for row in rows])
+            print(
+                json.dumps(
+                    {
+                        "record": name,
+                        "beta": beta,
+                        "alpha_2": round(rows[0].estimate.truth, 4),
+                        "U [%]": round(100.0 * found.relative, 3),
+                        "largest": largest.most_common(1)[0][0],
+                        "rms error/u": round(found.rms, 2),
+                        "held": round(found.covered, 3),
+                    }
+                )
+            )
