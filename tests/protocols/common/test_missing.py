@@ -33,8 +33,7 @@ def test_the_cause_and_its_remedy(channel: Channel, count: int, at_rest: bool, n
 
 
 def test_cycles_that_are_missing_because_values_were_late_do_not_blame_the_sensors_range() -> None:
-    with pytest.raises(
-        Unmeasurable, match="4 of 4 cycles have missing samples of laser_1: .* close other programs"
-    ) as no:
+    with pytest.raises(Unmeasurable, match="4 of 4 cycles have missing samples of laser_1") as refused:
         complete_cycles(Measured((), (LASER, LATE)), 4)
-    assert "range" not in str(no.value)
+    assert "close other programs" in str(refused.value)
+    assert "range" not in str(refused.value)
