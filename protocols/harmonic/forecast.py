@@ -19,7 +19,7 @@ from protocols.common.sine.demands import (
     slow,
     spring_calibration_trial,
 )
-from protocols.common.sine.holding import PATIENCE, too_late
+from protocols.common.sine.holding import MODEL_FREE_PATIENCE, PATIENCE, too_late
 from protocols.common.sine.pace import Pace
 from protocols.harmonic.plan import BARE_CHANGE
 from protocols.harmonic.protocol import HarmonicParameters
@@ -49,7 +49,8 @@ def trials(
         for omega, planned in plans.items():
             possible = parameters.hold and too_late(configuration, omega) is None
             held = possible and slow(coupled, omega, amplitude)
-            extra = 2.0 * PATIENCE * tau / omega if held else 0.0
+            patience = PATIENCE + (MODEL_FREE_PATIENCE if parameters.model_free else PATIENCE)
+            extra = patience * tau / omega if held else 0.0
             control = parameters.hold_authority if held else 0.0
             for number, start in enumerate(planned, 1):
                 name = f"start {number} of beta = {beta:g} at omega = {omega:g} rad/s"

@@ -14,9 +14,10 @@ from bench.analysis.gain import steady_peak
 from bench.analysis.running_gain import RunningGain, shared_draws
 from bench.analysis.sensor_accuracy import SensorUncertainty
 from bench.config.model import BenchConfiguration
+from bench.control.cycle_identification import Control, IdentifyingStabiliser
 from bench.control.oscillator import DriveCalibration, Segment
 from bench.control.sine import Sine
-from bench.control.stabiliser import GROWTH, StabiliserDesign
+from bench.control.stabiliser import GROWTH, Stabiliser, StabiliserDesign
 from bench.control.starts import Start
 from bench.engine.steps import Arm, Calibrate, Fallen, Outcome, Publish, RampOut, Step, Sweep
 from bench.events import PointFinished, StepStarted, Warned
@@ -121,12 +122,14 @@ class HarmonicPlan:
             if not isinstance((yield Sweep(start.segments)), Fallen):
                 settled = yield from self._settle(omega, specimen, calibration)
             held: Held | Fallen | None = None
-            if isinstance(settled, Settled) and held_by is not None and _to_be_held(settled, held_by):
+            stabiliser = self._stabiliser(omega, settled, held_by) if isinstance(settled, Settled) else None
+            if isinstance(settled, Settled) and stabiliser is not None:
                 if late is not None:
                     held = Held(None, late)
                 else:
-                    yield Publish(StepStarted(f"{where}: holding the motion on its orbit"))
-                    held = yield from self._hold(specimen, omega, calibration, settled, held_by)
+                    how = ", without a model" if self._parameters.model_free else ""
+                    yield Publish(StepStarted(f"{where}: holding the motion on its orbit{how}"))
+                    held = yield from self._hold(specimen, omega, calibration, settled, stabiliser)
             if not isinstance(settled, Settled):
                 falls += 1
                 yield from end_test(specimen, fast=True)
@@ -184,13 +187,24 @@ class HarmonicPlan:
             return None
         return prepared(orbit, self._configuration.simulated_shaker, self._parameters.harmonics)
 
+    def _stabiliser(self, omega: float, settled: Settled, design: StabiliserDesign | None) -> Control | None:
+        """Stabiliser of a motion that is to be held, because it is not steady or its orbit is predicted to be unstable
+        on the table; None for any other motion. `design` is that of the predicted orbit, None without one.
+        """
+        unstable = design is not None and abs(design.cycle_map.slowest) > 1.0
+        if not self._parameters.hold or (settled.steadiness.steady and not unstable):
+            return None
+        if self._parameters.model_free:
+            return IdentifyingStabiliser(omega, self._parameters.hold_authority)
+        return None if design is None else Stabiliser(design, self._parameters.hold_authority)
+
     def _hold(
         self,
         specimen: Specimen,
         omega: float,
         calibration: DriveCalibration,
         settled: Settled,
-        design: StabiliserDesign,
+        stabiliser: Control,
     ) -> Generator[Step, Outcome, Held | Fallen]:
         """Hold the present motion on its orbit, and measure it."""
         if settled.table is None:
@@ -204,7 +218,7 @@ class HarmonicPlan:
             yield from hold(
                 sine,
                 settled.table,
-                design,
+                stabiliser,
                 specimen.label or 0.0,
                 largest,
                 self._parameters,
@@ -251,8 +265,3 @@ class HarmonicPlan:
     @property
     def _sensors(self) -> SensorUncertainty:
         return checked(self._configuration.sensors, self._bare.values())
-
-
-def _to_be_held(settled: Settled, design: StabiliserDesign) -> bool:
-    """Whether to hold a motion, because it is not steady or its orbit is unstable on the table."""
-    return not settled.steadiness.steady or abs(design.cycle_map.slowest) > 1.0

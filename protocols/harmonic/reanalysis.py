@@ -196,6 +196,7 @@ class HarmonicFollower:
             phase_error=table.phase_error,
             control=point.control_share or 0.0,
             captured=point.captured_cycles,
+            model_free=point.model_free or False,
             cycles=len(series.recent),
             rate=_rate(point),
         )
