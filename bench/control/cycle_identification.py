@@ -13,6 +13,8 @@ The motion is linear only near the periodic one. A cycle at the relative distanc
 1 / (1 + (d / NEAR)^2), and the periodic motion and the weights are computed in turn.
 """
 
+from importlib import import_module
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -104,6 +106,11 @@ def identified_map(measured: Array, controls: Array, omega: float) -> CycleMap:
     )
 
 
+def load_solvers() -> None:
+    """Import the solvers of the design, which takes too long to be done while the table is driven."""
+    import_module("scipy.linalg")
+
+
 class IdentifyingStabiliser:
     """Stabiliser whose cycle map is identified from the cycles that it controls (see `Stabiliser`).
 
@@ -114,6 +121,7 @@ class IdentifyingStabiliser:
     phase = SECTION
 
     def __init__(self, omega: float, authority: float) -> None:
+        """For cycles at `omega` [rad/s]; `authority` is at least `EXCITATION`."""
         self._omega, self._authority = omega, authority
         self._random = np.random.default_rng(SEED)
         self._designed: Stabiliser | None = None
@@ -143,7 +151,7 @@ class IdentifyingStabiliser:
         if self._designed is not None:
             control = self._designed.next(y)
         else:
-            control = min(EXCITATION, self._authority) * 1j ** int(self._random.integers(4))
+            control = EXCITATION * 1j ** int(self._random.integers(4))
         self._controls.append(np.array([control.real, control.imag]))
         return control
 
@@ -166,4 +174,3 @@ class IdentifyingStabiliser:
 
 Control = Stabiliser | IdentifyingStabiliser
 """A stabiliser, whatever the origin of its map."""
-

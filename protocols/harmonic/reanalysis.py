@@ -102,7 +102,9 @@ class HarmonicFollower:
                     if free is not None:
                         self._end_series(free)
                         self._series.hold, self._series.turn = True, free.turn
-                        free.held = self._series
+                        # a second start for a hold without a model is not a test of its own
+                        held_after = free if free.tested or not self._tries else self._tries[-1]
+                        held_after.held = self._series
                 self._dwelling = True
             case _:
                 pass

@@ -58,7 +58,8 @@ def deflection(found: CycleMap, cycles: int, authority: float) -> NDArray[np.com
 def release(
     run: Hold, found: CycleMap, table: TableState, beta: float, largest: float, cycles: int, authority: float
 ) -> Generator[Step, Outcome, Released | Fallen]:
-    """Deflect the motion held by `run` along the dominant pair of its map `found`, release it, and observe up to `cycles` cycles without control.
+    """Deflect the motion held by `run` along the dominant pair of the map `found`, release it, and observe up to
+    `cycles` cycles without control.
 
     The observation ends early when the deviation is no longer linear or the drift exceeds `largest` [m].
     """

@@ -59,7 +59,10 @@ cycles after it in which the effects of the other multipliers decay.
 
 @event(table="hold_cycles", journalled=False)
 class HoldCycle(Event):
-    """One cycle of an unstable motion while it is held or after its release; values are NaN for an unmeasured cycle."""
+    """One cycle of an unstable motion while it is held or after its release.
+
+    Values are NaN for an unmeasured cycle; the deviation is also NaN before a map is identified.
+    """
 
     omega: float = column("rad/s", "circular frequency of the base motion")
     beta: float | None = column("1", "stiffness ratio of the coupling spring")
@@ -71,7 +74,7 @@ class HoldCycle(Event):
 
 @event(table="hold_maps", journalled=False)
 class HoldMap(Event):
-    """A cycle map identified during a model-free hold, from whose time on the stabiliser is the one designed for it."""
+    """A cycle map identified during a hold without a model; the stabiliser is then the one designed for this map."""
 
     omega: float = column("rad/s", "circular frequency of the base motion")
     beta: float | None = column("1", "stiffness ratio of the coupling spring")
@@ -155,9 +158,7 @@ def capture_and_measure(run: "Hold", beta: float, report: Report) -> Generator[S
             yield Publish(HoldCycle(run.sine.omega, beta, run.monitor.cycles, *run.last))
             if (found := run.stabiliser.cycle_map) is not shown and found is not None:
                 shown, slowest = found, found.slowest
-                yield Publish(
-                    HoldMap(run.sine.omega, beta, run.monitor.cycles, abs(slowest), float(np.angle(slowest)))
-                )
+                yield Publish(HoldMap(run.sine.omega, beta, run.monitor.cycles, abs(slowest), float(np.angle(slowest))))
             if reason is None:
                 reason = _delayed((yield SetHarmonics(run.command, run.monitor.cycles - 1 + DELAY, BLEND)))
             if reason is not None:
