@@ -12,7 +12,6 @@ from bench.control.cycle_identification import EXCITATION, EXCITED
 from bench.control.oscillator import Segment
 from bench.control.starts import Start
 from bench.datafile.reader import open_datafile
-from bench.events import StepStarted
 from protocols.common.sine.holding import HoldCycle, HoldMap
 from protocols.harmonic.approach import PAUSE, with_pause
 from protocols.harmonic.campaign import HarmonicCampaign
@@ -46,12 +45,13 @@ def test_the_unstable_orbit_is_held_without_a_model(held: dict[str, Any]) -> Non
 
 def test_the_file_states_excitation_and_identified_maps(held: dict[str, Any], folder: Path) -> None:
     with open_datafile(folder / "campaign.h5") as record:
-        cycles, maps, steps = (record.columns_of(each) for each in (HoldCycle, HoldMap, StepStarted))
+        cycles, maps = (record.columns_of(each) for each in (HoldCycle, HoldMap))
+        texts = [entry.text for entry in record.events]
     # a control is in effect two cycles after the measured one
     assert list(cycles["control"][2:EXCITED]) == pytest.approx([EXCITATION] * (EXCITED - 2), rel=1e-6)
     assert maps["cycle"][0] == EXCITED
     assert maps["modulus"][-1] == pytest.approx(held["table_multiplier"], abs=0.03)
-    assert any("holding the motion on its orbit, without a model" in text for text in steps["text"])
+    assert any("holding the motion on its orbit, without a model" in text for text in texts)
 
 
 def test_the_file_replays_to_the_last_bit_and_its_hold_is_analysed_again(
