@@ -69,16 +69,18 @@ def identified_map(measured: Array, controls: Array, omega: float) -> CycleMap:
 
     Raises numpy.linalg.LinAlgError if the cycles do not determine a map.
     """
-    known = np.isfinite(measured).all(axis=1)
+    known: NDArray[np.bool_] = np.asarray(np.isfinite(measured).all(axis=1), dtype=np.bool_)
     at = np.array([n for n in range(1, len(measured) - 1) if known[n] and known[n + 1]], dtype=np.intp)
     if at.size <= ORDER + 7:
         raise np.linalg.LinAlgError("too few cycles")
     weight, centre = np.ones(len(measured)), measured[known].mean(axis=0)
     scale_c = float(np.sqrt(np.mean(controls**2)))
     inputs = np.hstack([controls[at + shift] for shift in (1, 0, -1)]) / scale_c
+    orbit, plane = centre, np.zeros((measured.shape[1], ORDER))
+    a, f0, f1, f2 = np.zeros((ORDER, ORDER)), *np.zeros((3, ORDER, 2))
     for _ in range(ROUNDS):
         _, _, axes = np.linalg.svd((measured[known] - centre) * weight[known, None], full_matrices=False)
-        plane: Array = axes[:ORDER].T
+        plane = np.asarray(axes[:ORDER].T, dtype=np.float64)
         z = np.where(known[:, None], measured - centre, 0.0) @ plane
         scale = np.sqrt(np.average(z[at] ** 2, axis=0, weights=weight[at] ** 2))
         factor = np.minimum(weight[at], weight[at + 1])[:, None]
@@ -86,10 +88,10 @@ def identified_map(measured: Array, controls: Array, omega: float) -> CycleMap:
         ridge = RIDGE * float(np.sum(factor**2)) * np.eye(rows.shape[1])
         ridge[-1, -1] = 0.0
         found = np.linalg.solve(rows.T @ rows + ridge, rows.T @ (factor * z[at + 1] / scale)).T * scale[:, None]
-        a: Array = found[:, :ORDER] / scale
-        f0, f1, f2 = (found[:, ORDER + 2 * k : ORDER + 2 * k + 2] / scale_c for k in range(3))
+        a = np.asarray(found[:, :ORDER] / scale, dtype=np.float64)
+        f0, f1, f2 = (np.asarray(found[:, ORDER + 2 * k :][:, :2] / scale_c, dtype=np.float64) for k in range(3))
         step = plane @ np.linalg.solve(np.eye(ORDER) - a, found[:, -1])
-        orbit: Array = centre + step
+        orbit = np.asarray(centre + step, dtype=np.float64)
         distance = np.linalg.norm(np.where(known[:, None], measured - orbit, np.inf), axis=1)
         weight = 1.0 / (1.0 + (distance / (NEAR * np.linalg.norm(orbit))) ** 2)
         if np.linalg.norm(step) < FARTHEST * np.linalg.norm(centre):
@@ -99,7 +101,7 @@ def identified_map(measured: Array, controls: Array, omega: float) -> CycleMap:
         phase=SECTION,
         blend=BLEND,
         transition=a,
-        inputs=(f2, f1 + a @ f0),
+        inputs=(f2, np.asarray(f1 + a @ f0, dtype=np.float64)),
         outputs=plane,
         feedthrough=(np.zeros((measured.shape[1], 2)), plane @ f0),
         orbit=orbit,
@@ -127,7 +129,7 @@ class IdentifyingStabiliser:
         self._designed: Stabiliser | None = None
         self._measured = list[Array | None]()
         # controls of all measured cycles and of the one after them, preceded by that before the first one
-        self._controls = [np.zeros(2), np.zeros(2), np.zeros(2)]
+        self._controls: list[Array] = [np.zeros(2), np.zeros(2), np.zeros(2)]
         self.identified = 0
         """Number of identifications so far."""
 
@@ -145,7 +147,7 @@ class IdentifyingStabiliser:
         """Control of the cycle after next, as `Stabiliser.next`."""
         self._measured.append(y)
         count = len(self._measured) - EXCITED
-        quiet = all(float(np.hypot(*control)) <= SMALL for control in self._controls[-SETTLED:])
+        quiet = all(float(np.linalg.norm(control)) <= SMALL for control in self._controls[-SETTLED:])
         if count >= 0 and count % REPEATED == 0 and not quiet:
             self._identify()
         if self._designed is not None:

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from bench.control import cycle_identification
 from bench.control.cycle_identification import EXCITATION, EXCITED, SECTION, IdentifyingStabiliser, identified_map
@@ -48,8 +49,11 @@ def test_an_unstable_orbit_is_held_without_a_model(point: tuple[float, float]) -
 
 def wrong(change: Callable[[CycleMap], CycleMap], monkeypatch: pytest.MonkeyPatch) -> None:
     """Change every identified map."""
-    right = identified_map
-    monkeypatch.setattr(cycle_identification, "identified_map", lambda *given: change(right(*given)))
+
+    def changed(measured: NDArray[np.float64], controls: NDArray[np.float64], omega: float) -> CycleMap:
+        return change(identified_map(measured, controls, omega))
+
+    monkeypatch.setattr(cycle_identification, "identified_map", changed)
 
 
 @pytest.mark.parametrize("factor", [0.0, -1.0])
@@ -77,7 +81,7 @@ def test_a_linear_map_is_identified_exactly_and_lost_cycles_are_left_out(monkeyp
     b1, b0, c, d0 = (random.standard_normal(shape) for shape in ((4, 2), (4, 2), (12, 4), (12, 2)))
     orbit = 50.0 * random.standard_normal(12)
     controls = np.concatenate((np.zeros((1, 2)), 0.03 * random.standard_normal((60, 2))))
-    state, rows = 0.2 * random.standard_normal(4), list[np.ndarray]()
+    state, rows = 0.2 * random.standard_normal(4), list[NDArray[np.float64]]()
     # the feedthrough of a map with four components has to be in their plane
     d0 = c @ np.linalg.pinv(c) @ d0
     for n in range(1, len(controls)):
