@@ -11,6 +11,7 @@ when it is computed.
 """
 
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -79,6 +80,16 @@ class Stabiliser:
         self._before, self._now, self._next = np.zeros(2), np.zeros(2), np.zeros(2)
 
     @property
+    def cycle_map(self) -> CycleMap:
+        """The map for which the gains were designed."""
+        return self._map
+
+    @property
+    def phase(self) -> float:
+        """Phase of the base's sine at which the cycles begin [rad]."""
+        return self._map.phase
+
+    @property
     def deviation(self) -> float:
         """Norm of the estimated deviation of y from its value on the orbit, at the beginning of the next cycle,
         relative to the norm of that value.
@@ -89,6 +100,25 @@ class Stabiliser:
         """Control of the cycle after next, from the coefficients `y` of the cycle just measured; `y` is None for a
         cycle without a measurement.
         """
+        moved = self._estimate(y)
+        a, (b1, b0) = self._map.transition, self._map.inputs
+        ahead = a @ moved + b1 @ self._now + b0 @ self._next
+        control = -self._regulator @ np.concatenate((ahead, self._next))
+        control *= min(1.0, self._authority / max(float(np.hypot(*control)), 1e-12))
+        self._before, self._now, self._next = self._now, self._next, control
+        return complex(control[0], control[1])
+
+    def resume(self, measured: Sequence[Array | None], controls: Sequence[Array]) -> None:
+        """Estimate the state from cycles that were not controlled by this stabiliser: their `measured` coefficients,
+        and their `controls` with one before them and two after them, each of shape (2,).
+        """
+        for y, *parts in zip(measured, controls, controls[1:], controls[2:], strict=False):
+            self._before, self._now, self._next = parts
+            self._estimate(y)
+        self._before, self._now, self._next = controls[-3:]
+
+    def _estimate(self, y: Array | None) -> Array:
+        """Update the estimates from the coefficients `y` of a cycle; returns the state after it."""
         a, (b1, b0), c, (d1, d0) = (
             self._map.transition,
             self._map.inputs,
@@ -104,11 +134,7 @@ class Stabiliser:
             moved += correction[: moved.size]
             self._orbit = self._orbit + correction[moved.size :]
         self._state = moved
-        ahead = a @ moved + b1 @ self._now + b0 @ self._next
-        control = -self._regulator @ np.concatenate((ahead, self._next))
-        control *= min(1.0, self._authority / max(float(np.hypot(*control)), 1e-12))
-        self._before, self._now, self._next = self._now, self._next, control
-        return complex(control[0], control[1])
+        return moved
 
 
 def _regulator(found: CycleMap) -> Array:

@@ -11,6 +11,7 @@ import numpy as np
 
 from bench.analysis.steady import WINDOW
 from bench.config.model import BenchConfiguration
+from bench.control.cycle_identification import EXCITATION
 from bench.control.starts import OVERSHOOTS, Start, plan_starts
 from bench.datafile.tables import Column, Table, arrays
 from bench.document.typography import counted
@@ -58,6 +59,9 @@ class HarmonicCampaign(Prepared[HarmonicParameters]):
         self._motions: dict[tuple[float | None, float], Travel | None] = {}
         self._check_table()
         self._check_storeys()
+        if parameters.model_free and parameters.hold_authority < EXCITATION:
+            needs = f"without a model, the motion is identified with controls of {EXCITATION:g} of the amplitude"
+            raise InvalidInput("hold_authority", parameters.hold_authority, needs)
 
     @cached_property
     def starts(self) -> Mapping[tuple[float, float], tuple[Start, ...]]:

@@ -19,8 +19,9 @@ from protocols.common.sine.demands import (
     slow,
     spring_calibration_trial,
 )
-from protocols.common.sine.holding import PATIENCE, too_late
+from protocols.common.sine.holding import MODEL_FREE_PATIENCE, PATIENCE, too_late
 from protocols.common.sine.pace import Pace
+from protocols.harmonic.approach import stable_above, with_pause
 from protocols.harmonic.plan import BARE_CHANGE
 from protocols.harmonic.protocol import HarmonicParameters
 from sim.specimen import Specimen
@@ -49,12 +50,18 @@ def trials(
         for omega, planned in plans.items():
             possible = parameters.hold and too_late(configuration, omega) is None
             held = possible and slow(coupled, omega, amplitude)
-            extra = 2.0 * PATIENCE * tau / omega if held else 0.0
+            patience = PATIENCE + (MODEL_FREE_PATIENCE if parameters.model_free else PATIENCE)
+            extra = patience * tau / omega if held else 0.0
             control = parameters.hold_authority if held else 0.0
+            again = held and parameters.model_free
+            pause = stable_above(coupled, omega, amplitude) if again else None
             for number, start in enumerate(planned, 1):
                 name = f"start {number} of beta = {beta:g} at omega = {omega:g} rad/s"
                 stage = Stage(name, start.segments, start.chance)
                 yield Trial(stage, coupled, (), HOLD, longest + extra, beta, omega, control)
+                if again and (segments := with_pause(start, pause)) != start.segments:
+                    stage = Stage(f"second {name}", segments, start.chance)
+                    yield Trial(stage, coupled, (), HOLD, extra, beta, omega, control)
 
 
 def _bare_tests(parameters: HarmonicParameters, specimen: Specimen) -> Iterator[Trial]:

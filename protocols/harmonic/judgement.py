@@ -165,7 +165,8 @@ def _held_point(free: HarmonicPoint, held: Held, conditions: Conditions) -> Harm
     comparison = conditions.comparison(_ROCKING, branches[_ROCKING], peak)
     measured, agrees = comparison.compare(peak)
     remarks = [f"free: {free.reason}"] if free.reason else []
-    remarks.append(f"captured after cycle {held.captured}, control {100.0 * held.control:.2g} % of the amplitude (rms)")
+    captured = f"captured after cycle {held.captured}" + (" without a model" if held.model_free else "")
+    remarks.append(f"{captured}, control {100.0 * held.control:.2g} % of the amplitude (rms)")
     remarks += [*_amplitude_remark(held), *([DIFFERS] if agrees is False else [])]
     return free.model_copy(
         update={
@@ -174,6 +175,7 @@ def _held_point(free: HarmonicPoint, held: Held, conditions: Conditions) -> Harm
             **_rate_fields(held.rate),
             "control_share": held.control,
             "captured_cycles": held.captured,
+            "model_free": held.model_free,
             "table_updates": free.table_updates + held.updates,
             "reason": "; ".join(remarks),
         }

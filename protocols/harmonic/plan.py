@@ -8,24 +8,47 @@
 """
 
 from collections.abc import Generator, Mapping, Sequence
+from dataclasses import replace
 
 from bench.analysis.cycles import Cycle
 from bench.analysis.gain import steady_peak
 from bench.analysis.running_gain import RunningGain, shared_draws
 from bench.analysis.sensor_accuracy import SensorUncertainty
 from bench.config.model import BenchConfiguration
+from bench.control.cycle_identification import Control, IdentifyingStabiliser, load_solvers
 from bench.control.oscillator import DriveCalibration, Segment
 from bench.control.sine import Sine
-from bench.control.stabiliser import GROWTH, StabiliserDesign
+from bench.control.stabiliser import GROWTH, Stabiliser, StabiliserDesign
 from bench.control.starts import Start
-from bench.engine.steps import Arm, Calibrate, Fallen, Outcome, Publish, RampOut, Step, Sweep
+from bench.engine.steps import (
+    Arm,
+    Calibrate,
+    Dwell,
+    Fallen,
+    Measured,
+    Outcome,
+    Publish,
+    RampOut,
+    SetHarmonics,
+    Step,
+    Sweep,
+)
 from bench.events import PointFinished, StepStarted, Warned
 from bench.live_values import Estimate
 from drivers.rig import RigError
 from protocols.common.sine.calibration import NO_BLOCK, REST, bare_calibration, end_test, spring_calibration
 from protocols.common.sine.holding import SLOW, hold, prepared, too_late
 from protocols.common.sine.pace import Pace
-from protocols.common.sine.settling import Held, Report, Settled, checked, linear_frame, settle_and_measure
+from protocols.common.sine.settling import (
+    Held,
+    Report,
+    Settled,
+    TableState,
+    checked,
+    linear_frame,
+    settle_and_measure,
+)
+from protocols.harmonic.approach import far, stable_above, with_pause
 from protocols.harmonic.free_prediction import with_free_prediction
 from protocols.harmonic.judgement import Conditions, judge, predicted_fields
 from protocols.harmonic.protocol import HarmonicParameters, HarmonicPoint, PointStatus
@@ -112,6 +135,11 @@ class HarmonicPlan:
         late = too_late(self._configuration, omega)
         # also prepared if a correction would come too late: the first start then gives the reason
         held_by = self._prepared(orbit) if slow or late is not None else None
+        model_free = self._parameters.hold and self._parameters.model_free
+        pause: float | None = None
+        if model_free and late is None:
+            load_solvers()
+            pause = stable_above(specimen, omega, self._amplitude)
         for tried, start in enumerate(starts, 1):
             where = f"beta = {specimen.label:g} at {omega:g} rad/s, start {tried} of {len(starts)}: {start.name}"
             yield Publish(StepStarted(f"{where}, chance {start.chance:.0%}"))
@@ -121,12 +149,19 @@ class HarmonicPlan:
             if not isinstance((yield Sweep(start.segments)), Fallen):
                 settled = yield from self._settle(omega, specimen, calibration)
             held: Held | Fallen | None = None
-            if isinstance(settled, Settled) and held_by is not None and _to_be_held(settled, held_by):
+            stabiliser = self._stabiliser(omega, settled, held_by) if isinstance(settled, Settled) else None
+            if isinstance(settled, Settled) and stabiliser is not None:
                 if late is not None:
                     held = Held(None, late)
                 else:
-                    yield Publish(StepStarted(f"{where}: holding the motion on its orbit"))
-                    held = yield from self._hold(specimen, omega, calibration, settled, held_by)
+                    table: TableState | Fallen | None = settled.table
+                    if model_free and far(settled):
+                        yield Publish(StepStarted(f"{where}: starting again, to identify the motion near its orbit"))
+                        yield from end_test(specimen, fast=False)
+                        table = yield from self._started_again(with_pause(start, pause), omega, calibration, settled)
+                    how = ", without a model" if model_free else ""
+                    yield Publish(StepStarted(f"{where}: holding the motion on its orbit{how}"))
+                    held = yield from self._hold(specimen, omega, calibration, settled, table, stabiliser)
             if not isinstance(settled, Settled):
                 falls += 1
                 yield from end_test(specimen, fast=True)
@@ -184,16 +219,48 @@ class HarmonicPlan:
             return None
         return prepared(orbit, self._configuration.simulated_shaker, self._parameters.harmonics)
 
+    def _stabiliser(self, omega: float, settled: Settled, design: StabiliserDesign | None) -> Control | None:
+        """Stabiliser of a motion that is to be held, because it is not steady or its orbit is predicted to be unstable
+        on the table; None for any other motion. `design` is that of the predicted orbit, None without one.
+        """
+        unstable = design is not None and abs(design.cycle_map.slowest) > 1.0
+        if not self._parameters.hold or (settled.steadiness.steady and not unstable):
+            return None
+        if self._parameters.model_free:
+            return IdentifyingStabiliser(omega, self._parameters.hold_authority)
+        return None if design is None else Stabiliser(design, self._parameters.hold_authority)
+
+    def _started_again(
+        self, segments: tuple[Segment, ...], omega: float, calibration: DriveCalibration, settled: Settled
+    ) -> Generator[Step, Outcome, TableState | Fallen | None]:
+        """Start again, with the harmonics of the drive found before; returns the state of the table."""
+        yield Arm(REST)
+        yield Calibrate(calibration)
+        if isinstance((yield Sweep(segments)), Fallen):
+            return Fallen()
+        outcome = yield Dwell(1)
+        if not isinstance(outcome, Measured):
+            return Fallen()
+        if settled.table is None or not outcome.cycles:
+            return None
+        yield SetHarmonics(settled.table.shares)
+        return replace(settled.table, turn=Sine(omega, self._amplitude, calibration).turn(outcome.cycles[0]))
+
     def _hold(
         self,
         specimen: Specimen,
         omega: float,
         calibration: DriveCalibration,
         settled: Settled,
-        design: StabiliserDesign,
+        table: TableState | Fallen | None,
+        stabiliser: Control,
     ) -> Generator[Step, Outcome, Held | Fallen]:
-        """Hold the present motion on its orbit, and measure it."""
-        if settled.table is None:
+        """Hold the present motion on its orbit, and measure it; `settled` is the free motion, `table` the present state
+        of the table.
+        """
+        if isinstance(table, Fallen):
+            return table
+        if table is None:
             return Held(None, "the amplitude and phase of the table are unknown")
         sine = Sine(omega, self._amplitude, calibration)
         free = settled.peak.drift if settled.motion is None else settled.motion.greatest
@@ -203,8 +270,8 @@ class HarmonicPlan:
         return (
             yield from hold(
                 sine,
-                settled.table,
-                design,
+                table,
+                stabiliser,
                 specimen.label or 0.0,
                 largest,
                 self._parameters,
@@ -251,8 +318,3 @@ class HarmonicPlan:
     @property
     def _sensors(self) -> SensorUncertainty:
         return checked(self._configuration.sensors, self._bare.values())
-
-
-def _to_be_held(settled: Settled, design: StabiliserDesign) -> bool:
-    """Whether to hold a motion, because it is not steady or its orbit is unstable on the table."""
-    return not settled.steadiness.steady or abs(design.cycle_map.slowest) > 1.0

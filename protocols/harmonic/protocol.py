@@ -39,6 +39,12 @@ class HarmonicParameters(SineParameters, HarmonicPoints):
         "whether a motion that does not become steady, or whose orbit is unstable, is held on its orbit and measured "
         "again",
     )
+    model_free: bool = quantity(
+        False,
+        "",
+        "whether the stabiliser of a held motion uses a map identified in the run instead of the model of specimen and "
+        "table",
+    )
 
 
 class PointStatus(StrEnum):
@@ -69,6 +75,9 @@ class HarmonicPoint(Parameters):
     )
     captured_cycles: int | None = quantity(
         None, "1", "number of cycles from the beginning of the hold to the capture of the motion"
+    )
+    model_free: bool | None = quantity(
+        None, "", "whether a held motion was stabilised without the model of specimen and table"
     )
     alpha_2_least: float | None = quantity(None, "1", "gain of the smallest cycle peak of an unsteady free motion")
     alpha_2_greatest: float | None = quantity(
@@ -219,7 +228,7 @@ PROTOCOL = Protocol(
     point=HarmonicPoint,
     prepare=deferred("protocols.harmonic.campaign:HarmonicCampaign"),
     figures=("gain_spectra.png",),
-    events=("protocols.common.sine.holding:HoldCycle",),
+    events=("protocols.common.sine.holding:HoldCycle", "protocols.common.sine.holding:HoldMap"),
     reanalysis=Reanalysis(HarmonicSettings, deferred("protocols.harmonic.reanalysis:HarmonicFollower")),
     report=deferred("protocols.harmonic.report:harmonic_sections"),
     view=RunView(

@@ -102,7 +102,9 @@ class HarmonicFollower:
                     if free is not None:
                         self._end_series(free)
                         self._series.hold, self._series.turn = True, free.turn
-                        free.held = self._series
+                        # a second start for a hold without a model is not a test of its own
+                        held_after = free if free.tested or not self._tries else self._tries[-1]
+                        held_after.held = self._series
                 self._dwelling = True
             case _:
                 pass
@@ -196,6 +198,7 @@ class HarmonicFollower:
             phase_error=table.phase_error,
             control=point.control_share or 0.0,
             captured=point.captured_cycles,
+            model_free=point.model_free or False,
             cycles=len(series.recent),
             rate=_rate(point),
         )

@@ -19,7 +19,7 @@ from bench.analysis.gain import COVERAGE, steady_peak
 from bench.config.model import BenchConfiguration
 from bench.control.oscillator import DriveCalibration, Segment
 from bench.control.sine import Sine
-from bench.control.stabiliser import GROWTH, StabiliserDesign
+from bench.control.stabiliser import GROWTH, Stabiliser, StabiliserDesign
 from bench.control.starts import Start
 from bench.engine.steps import Arm, Calibrate, Fallen, Outcome, Publish, RampOut, Step, Sweep
 from bench.events import PointFinished, StepStarted
@@ -206,7 +206,8 @@ class StabilityPlan:
             return Fallen()
         largest = self._largest(settled)
         yield Publish(StepStarted(f"{where}: holding the motion on its orbit"))
-        run = Hold(sine, settled.table, trial.design, largest, p, configuration.analysis)
+        stabiliser = Stabiliser(trial.design, p.hold_authority)
+        run = Hold(sine, settled.table, stabiliser, largest, p, configuration.analysis)
         held = yield from capture_and_measure(run, p.beta, report)
         if isinstance(held, Fallen):
             return held
@@ -214,7 +215,8 @@ class StabilityPlan:
             return StabilityPoint.model_validate(
                 {**fields, "status": OrbitStatus.NOT_HELD, "captured_cycles": held.captured, "reason": held.reason}
             )
-        released = yield from release(run, settled.table, p.beta, largest, p.released_cycles, p.hold_authority)
+        found = trial.design.cycle_map
+        released = yield from release(run, found, settled.table, p.beta, largest, p.released_cycles, p.hold_authority)
         return released if isinstance(released, Fallen) else self._measured(trial, held, released, fields)
 
     def _largest(self, settled: Settled) -> float:

@@ -56,16 +56,17 @@ def deflection(found: CycleMap, cycles: int, authority: float) -> NDArray[np.com
 
 
 def release(
-    run: Hold, table: TableState, beta: float, largest: float, cycles: int, authority: float
+    run: Hold, found: CycleMap, table: TableState, beta: float, largest: float, cycles: int, authority: float
 ) -> Generator[Step, Outcome, Released | Fallen]:
-    """Deflect the motion held by `run`, release it, and observe up to `cycles` cycles without control.
+    """Deflect the motion held by `run` along the dominant pair of the map `found`, release it, and observe up to
+    `cycles` cycles without control.
 
     The observation ends early when the deviation is no longer linear or the drift exceeds `largest` [m].
     """
     sine, count = run.sine, run.monitor.cycles
     orbit = np.mean([observed(cycle, table.turn) for cycle in run.used], axis=0)
     size = float(np.linalg.norm(orbit))
-    controls = (*deflection(run.design.cycle_map, cycles, authority), 0j)
+    controls = (*deflection(found, cycles, authority), 0j)
     yield Publish(StepStarted(f"beta = {beta:g} at {sine.omega:g} rad/s: deflecting, then observing the deviation"))
     rows = list[Array]()
     first, *others = run.shares

@@ -97,8 +97,8 @@ def study() -> None:
     parser.add_argument("--first", type=int, default=1)
     parser.add_argument("--share", type=float, default=0.04)
     parser.add_argument("--points", nargs="+", default=["15:0.97", "12.5:0.64", "14:0.97"])
-    parser.add_argument("--options", nargs="*", default=["--settle-limit", "40"])
     parser.add_argument("--scales", action="store_true", help="draw the scales of the sensors as well")
+    parser.add_argument("--options", nargs=argparse.REMAINDER, default=["--settle-limit", "40"])
     asked = parser.parse_args()
     for text in asked.points:
         omega, beta = map(float, text.split(":"))

@@ -13,8 +13,9 @@ from bench.analysis.gain import SensorAccuracy, steady_peak
 from bench.analysis.signals import DRIFT
 from bench.analysis.steady import WINDOW, SteadyDetector
 from bench.config.model import BenchConfiguration
+from bench.control.cycle_identification import Control, IdentifyingStabiliser
 from bench.control.sine import Sine, SineControl, SineResponse, Tolerance
-from bench.control.stabiliser import BLEND, DELAY, HoldMonitor, Stabiliser, StabiliserDesign, observed
+from bench.control.stabiliser import BLEND, DELAY, HoldMonitor, StabiliserDesign, observed
 from bench.engine.steps import Dwell, Fallen, Measured, Outcome, Publish, Scheduled, SetHarmonics, Step
 from bench.events import Event, StepStarted, event
 from protocols.common.sine.settings import SineParameters
@@ -33,9 +34,10 @@ from sim.parameters import column
 from sim.shaker import Shaker
 from sim.steady import NoOrbit, Orbit
 
-PATIENCE = 200
-"""Number of cycles within which a motion must be captured; capture, correction of the table and measurement together
-may take twice as many.
+PATIENCE, MODEL_FREE_PATIENCE = 200, 400
+"""Number of cycles within which a motion must be captured, with a predicted or an identified map.
+
+Correction of the table and measurement together may take another `PATIENCE` cycles.
 """
 
 SLOW = 0.985
@@ -57,7 +59,10 @@ cycles after it in which the effects of the other multipliers decay.
 
 @event(table="hold_cycles", journalled=False)
 class HoldCycle(Event):
-    """One cycle of an unstable motion while it is held or after its release; values are NaN for an unmeasured cycle."""
+    """One cycle of an unstable motion while it is held or after its release.
+
+    Values are NaN for an unmeasured cycle; the deviation is also NaN before a map is identified.
+    """
 
     omega: float = column("rad/s", "circular frequency of the base motion")
     beta: float | None = column("1", "stiffness ratio of the coupling spring")
@@ -65,6 +70,17 @@ class HoldCycle(Event):
     drift_peak: float = column("m", "peak drift in the cycle")
     deviation: float = column("1", "estimated deviation from the periodic motion, relative to that motion")
     control: float = column("1", "magnitude of the control in the cycle, relative to the table's amplitude")
+
+
+@event(table="hold_maps", journalled=False)
+class HoldMap(Event):
+    """A cycle map identified during a hold without a model; the stabiliser is then the one designed for this map."""
+
+    omega: float = column("rad/s", "circular frequency of the base motion")
+    beta: float | None = column("1", "stiffness ratio of the coupling spring")
+    cycle: int = column("1", "number of the cycle since the beginning of the hold")
+    modulus: float = column("1", "modulus of the dominant pair of multipliers of the map")
+    angle: float = column("rad", "argument of the dominant pair of multipliers of the map")
 
 
 def prepared(orbit: Orbit | None, shaker: Shaker | None, harmonics: int) -> StabiliserDesign | None:
@@ -98,24 +114,25 @@ def too_late(configuration: BenchConfiguration, omega: float) -> str | None:
 def hold(
     sine: Sine,
     table: TableState,
-    design: StabiliserDesign,
+    stabiliser: Control,
     beta: float,
     largest: float,
     parameters: SineParameters,
     accuracy: SensorAccuracy,
     report: Report,
 ) -> Generator[Step, Outcome, Held | Fallen]:
-    """Capture the orbit of `design` from the present motion, hold it, measure it, and observe its motion after release.
+    """Capture an orbit from the present motion, hold it, measure it, and observe its motion after release.
 
     `largest` [m] is the largest peak drift allowed. The amplitude control is inactive while the motion is captured;
     after that it corrects the harmonics of the drive, to which the control of the hold is added.
     """
-    run = Hold(sine, table, design, largest, parameters, accuracy)
+    run = Hold(sine, table, stabiliser, largest, parameters, accuracy)
     held = yield from capture_and_measure(run, beta, report)
-    if isinstance(held, Fallen) or held.peak is None:
+    found = stabiliser.cycle_map
+    if isinstance(held, Fallen) or held.peak is None or found is None:
         return held
     first, *others = run.shares
-    kicked = (first + KICK * design.cycle_map.sensitive / table.answer, *others)
+    kicked = (first + KICK * found.sensitive / table.answer, *others)
     yield SetHarmonics(kicked, run.monitor.cycles + 1, BLEND)
     yield SetHarmonics(run.shares, run.monitor.cycles + 2, BLEND)
     free = yield from _released(sine, beta, held.peak.drift, largest, run.monitor.cycles)
@@ -127,7 +144,8 @@ def capture_and_measure(run: "Hold", beta: float, report: Report) -> Generator[S
 
     On return, the control of the last cycle is still in effect, unless the hold was released for the stated reason.
     """
-    phase: float | None = run.design.cycle_map.phase
+    phase: float | None = run.stabiliser.phase
+    shown = run.stabiliser.cycle_map
     while True:
         outcome = yield Dwell(1, phase)
         phase = None
@@ -138,6 +156,9 @@ def capture_and_measure(run: "Hold", beta: float, report: Report) -> Generator[S
             if not np.isfinite(run.command[0]):
                 reason = "the estimate of the deviation is not finite"
             yield Publish(HoldCycle(run.sine.omega, beta, run.monitor.cycles, *run.last))
+            if (found := run.stabiliser.cycle_map) is not shown and found is not None:
+                shown, slowest = found, found.slowest
+                yield Publish(HoldMap(run.sine.omega, beta, run.monitor.cycles, abs(slowest), float(np.angle(slowest))))
             if reason is None:
                 reason = _delayed((yield SetHarmonics(run.command, run.monitor.cycles - 1 + DELAY, BLEND)))
             if reason is not None:
@@ -196,15 +217,15 @@ class Hold:
         self,
         sine: Sine,
         table: TableState,
-        design: StabiliserDesign,
+        stabiliser: Control,
         largest: float,
         parameters: SineParameters,
         accuracy: SensorAccuracy,
     ) -> None:
-        self.sine, self.design = sine, design
+        self.sine, self.stabiliser = sine, stabiliser
         self._table, self._parameters = table, parameters
-        self._stabiliser = Stabiliser(design, parameters.hold_authority)
-        self.monitor = HoldMonitor(sine.omega, parameters.hold_authority, PATIENCE, largest, table.answer)
+        patience = MODEL_FREE_PATIENCE if isinstance(stabiliser, IdentifyingStabiliser) else PATIENCE
+        self.monitor = HoldMonitor(sine.omega, parameters.hold_authority, patience, largest, table.answer)
         tolerances = (parameters.amplitude_tolerance, parameters.phase_tolerance, parameters.distortion_tolerance)
         self._control = SineControl(parameters.harmonics, Tolerance(*(AIM * each for each in tolerances)))
         jitter = sine.omega * accuracy.laser_timing
@@ -229,13 +250,13 @@ class Hold:
         hold, if any.
         """
         y = None if cycle is None else observed(cycle, self._table.turn)
-        self._controls.append(self._stabiliser.next(y))
+        self._controls.append(self.stabiliser.next(y))
         control = self._controls[0]
         if cycle is None:
             self.last = (nan, nan, abs(control))
             return self.monitor.missed()
         drift = float(cycle.extreme[DRIFT])
-        self.last = (drift, self._stabiliser.deviation, abs(control))
+        self.last = (drift, self.stabiliser.deviation, abs(control))
         self.recent.append(cycle)
         reason = self.monitor.push(control, drift, *self.sine.fundamentals(cycle, self._table.turn))
         if reason is None and self.monitor.captured_after is not None:
@@ -244,8 +265,9 @@ class Hold:
 
     def _settle(self, cycle: Cycle, control: float) -> str | None:
         """Correct the table until its motion is a sine, then collect cycles; returns the reason to release, if any."""
-        if self.monitor.cycles > 2 * PATIENCE:
-            return f"the held motion was not steady within {2 * PATIENCE} cycles"
+        longest = self.monitor.patience + PATIENCE
+        if self.monitor.cycles > longest:
+            return f"the held motion was not steady within {longest} cycles"
         self._since += 1
         if self._since <= TRANSIENT:
             return None
@@ -284,4 +306,5 @@ class Hold:
             control=sqrt(float(np.mean(controls**2))),
             captured=self.monitor.captured_after,
             cycles=self.monitor.cycles,
+            model_free=isinstance(self.stabiliser, IdentifyingStabiliser),
         )

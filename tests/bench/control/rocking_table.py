@@ -6,7 +6,8 @@ from math import tau
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.control.stabiliser import BLEND, Stabiliser
+from bench.control.cycle_identification import Control
+from bench.control.stabiliser import BLEND
 from sim.arrangement import plant_of
 from sim.cycle_map import OBSERVED, CycleMap, coefficients, cycle_map
 from sim.kernel import table
@@ -80,7 +81,7 @@ class RockingTable:
     def fell(self) -> bool:
         return self._mode == FALLEN
 
-    def hold(self, stabiliser: Stabiliser, cycles: int, noise: float = 0.0, seed: int = 0) -> Held:
+    def hold(self, stabiliser: Control, cycles: int, noise: float = 0.0, seed: int = 0) -> Held:
         """Control `cycles` cycles, each correction two cycles after the measured one; `noise` [m] of a coefficient."""
         random, peaks, controls = np.random.default_rng(seed), list[float](), [0j, 0j, 0j]
         for _ in range(cycles):

@@ -14,7 +14,7 @@ from bench.config.model import BenchConfiguration
 from bench.config.sections import Acquisition
 from bench.control.oscillator import DriveCalibration
 from bench.control.sine import Sine
-from bench.control.stabiliser import DELAY, StabiliserDesign
+from bench.control.stabiliser import DELAY, Stabiliser, StabiliserDesign
 from bench.engine.steps import Done, Dwell, Measured, Outcome, Publish, Scheduled, SetHarmonics, Step
 from bench.events import StepStarted
 from protocols.common.sine import holding
@@ -137,7 +137,8 @@ def held_by(
         yield from ()
 
     table = TableState(TURN, (1.0 + 0.0j,), 1.0 + 0.0j)
-    plan = hold(SINE, table, design, BETA, LARGEST, PARAMETERS, BenchConfiguration().analysis, report)
+    stabiliser = Stabiliser(design, PARAMETERS.hold_authority)
+    plan = hold(SINE, table, stabiliser, BETA, LARGEST, PARAMETERS, BenchConfiguration().analysis, report)
     steps, drifts = list[Step](), peaks(False)
     step = next(plan)
     try:
