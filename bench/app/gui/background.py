@@ -12,7 +12,8 @@ from time import monotonic
 from typing import IO
 from weakref import WeakSet
 
-from PySide6.QtCore import QObject, QTimer, Signal
+from PySide6.QtCore import QBuffer, QObject, QTimer, Signal
+from PySide6.QtGui import QImageReader
 
 from bench.app.reading_process import ReadingProcess
 from sim.errors import RockbenchError
@@ -26,6 +27,18 @@ ENDING = 0.2
 
 _files = ReadingProcess()
 _threads = WeakSet[Thread]()
+
+
+def png_reader(data: QBuffer) -> QImageReader:
+    """Reader of a PNG picture that may be used in a thread.
+
+    To find out the format, Qt asks the SVG plug-in, which connects signals. The thread then waits for Qt's lock of
+    connections while it holds Python's, and the program stops for ever if the main thread, which deletes a widget,
+    holds the former and waits for the latter.
+    """
+    reader = QImageReader(data, b"png")  # pyright: ignore[reportArgumentType]
+    reader.setAutoDetectImageFormat(False)
+    return reader
 
 
 class _Answers(QObject):

@@ -4,13 +4,13 @@ from functools import partial
 from pathlib import Path
 from typing import cast
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QBuffer, Qt
 from PySide6.QtGui import QImage, QPixmap, QResizeEvent
 from PySide6.QtWidgets import QComboBox, QLabel, QSizePolicy, QVBoxLayout, QWidget
 
 from bench.app.display import texts
 from bench.app.display.theme import Theme
-from bench.app.gui.background import Reader
+from bench.app.gui.background import Reader, png_reader
 from bench.app.gui.score_strip import ScoreStrip
 
 
@@ -21,7 +21,9 @@ def find_figures(folder: Path) -> list[Path]:
 
 def read_figure(path: Path) -> QImage:
     """A picture. Raises OSError."""
-    return QImage.fromData(path.read_bytes())
+    data = QBuffer()
+    data.setData(path.read_bytes())
+    return png_reader(data).read()
 
 
 class FigureView(QWidget):

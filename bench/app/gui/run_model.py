@@ -15,12 +15,12 @@ from PySide6.QtCore import (
     Qt,
     Signal,
 )
-from PySide6.QtGui import QColor, QFont, QImage, QImageReader, QPainter, QPixmap
+from PySide6.QtGui import QColor, QFont, QImage, QPainter, QPixmap
 
 from bench.app.display import texts
 from bench.app.display.run_list import Found, RunRow
 from bench.app.display.theme import Theme
-from bench.app.gui.background import Reader
+from bench.app.gui.background import Reader, png_reader
 
 PICTURE = QSize(64, 40)
 """Size of a picture in the list [px]."""
@@ -45,7 +45,7 @@ def _fitted(path: Path, size: QSize) -> QImage:
         data.setData(path.read_bytes())
     except OSError:
         return QImage()
-    reader = QImageReader(data)
+    reader = png_reader(data)
     whole = reader.size()
     if not whole.isValid():
         return QImage()

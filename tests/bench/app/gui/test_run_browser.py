@@ -8,7 +8,7 @@ from collections.abc import Generator
 from pathlib import Path
 
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QImage
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
@@ -18,6 +18,7 @@ from bench.app.display.run_list import Found, RunRow, find_runs, read_row
 from bench.app.display.theme import LIGHT
 from bench.app.gui import run_browser, run_model
 from bench.app.gui.controller import Controller
+from bench.app.gui.figure_view import read_figure
 from bench.app.gui.results_page import ResultsPage
 from bench.app.gui.run_browser import RunBrowser
 from bench.config.model import BenchConfiguration
@@ -295,6 +296,18 @@ def test_a_thousand_runs_are_read_in_the_thread_and_pictures_on_demand(
     assert threading.get_ident() not in threads
     assert len(pictures) < 100
     browser.hide()
+
+
+@pytest.mark.usefixtures("qapp")
+def test_threads_read_png_only_and_never_ask_the_plug_in_for_svg(folder: Path, tmp_path: Path) -> None:
+    """That plug-in connects signals, which in a thread may stop the program while a widget is deleted."""
+    drawn = tmp_path / "drawn.png"
+    drawn.write_text('<svg xmlns="http://www.w3.org/2000/svg" width="9" height="9"><rect width="9" height="9"/></svg>')
+    figure, size = folder / "monday" / "gain_spectra.png", QSize(64, 40)
+    assert not run_model.load_pictures([(figure, ())], size)[figure, ()].isNull()
+    assert not read_figure(figure).isNull()
+    assert run_model.load_pictures([(drawn, ())], size)[drawn, ()].isNull()
+    assert read_figure(drawn).isNull()
 
 
 def test_the_picture_is_the_main_figure_of_the_protocol(folder: Path) -> None:
