@@ -33,11 +33,14 @@ would block the whole process, including the drive.
 
 
 def locking(system: str = sys.platform) -> Literal["best-effort"] | bool:
-    """Locking mode with which h5py opens every file.
+    """Locking mode with which h5py opens every file except one that is being written.
 
+    A file that is being written is not locked on any system, neither by its writer nor by a reader that follows it: a
+    lock between creation and the change to single-writer mode would make the writer fail. That mode and creation
+    without replacement protect the file.
     On Windows locks are mandatory: a reader of a file that is being written would make its writer fail at the next
-    flush or at the end, with errno 13. No locks are used there; single-writer mode and creation without replacement
-    protect the file. Elsewhere locks are advisory, and network shares may not support them.
+    flush or at the end, with errno 13. No locks are used there. Elsewhere locks are advisory, and network shares may
+    not support them.
     """
     return False if system == "win32" else "best-effort"
 
@@ -59,7 +62,7 @@ def _opened(path: Path, mode: int) -> Any:
     made = h5p.create(h5p.FILE_ACCESS)
     made.set_libver_bounds(h5f.LIBVER_V110, h5f.LIBVER_V110)
     made.set_alignment(1, 1)
-    made.set_file_locking(bool(locking()), ignore_when_disabled=True)
+    made.set_file_locking(False, ignore_when_disabled=True)
     if (limit := _retry_limit()) is not None:
         limit(made.id, RETRIES)
     return h5py.File(h5f.open(os.fsencode(path), mode, fapl=made))

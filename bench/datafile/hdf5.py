@@ -53,7 +53,7 @@ def create(path: Path) -> File:
     """Create a new file; raises FileExistsError if it exists."""
     # metadata are allocated in small pages, so that no object header crosses the border of a disk sector, where a power
     # failure could leave it half written (measured in docs/decisions, no. 10)
-    return cast(File, h5py.File(path, "x", libver=VERSIONS, locking=locking(), fs_strategy="page", fs_page_size=PAGE))
+    return cast(File, h5py.File(path, "x", libver=VERSIONS, locking=False, fs_strategy="page", fs_page_size=PAGE))
 
 
 def reopen_to_write(file: File) -> File:

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from bench.datafile import hdf5
 from bench.datafile.access import locking
 from bench.datafile.hdf5_reading import DataFileError
 from bench.datafile.inspection import overview, verify
@@ -181,3 +182,16 @@ def test_a_reader_that_follows_a_file_notices_that_it_is_truncated(tmp_path: Pat
 def test_nobody_locks_a_file_where_locks_are_mandatory() -> None:
     assert locking("win32") is False
     assert locking("linux") == "best-effort"
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="locks of the whole file, as HDF5 makes them on other systems")
+def test_a_reader_that_locks_the_file_while_it_is_created_does_not_end_the_recording(tmp_path: Path) -> None:
+    import fcntl
+
+    path = tmp_path / "run.h5"
+    file = hdf5.create(path)
+    with path.open("rb") as reader:
+        fcntl.flock(reader, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        file = hdf5.reopen_to_write(file)
+        file.flush()
+    file.close()
