@@ -37,7 +37,7 @@ def difference(value: float | None, reference: float | None) -> str:
     """Deviation of `value` from `reference`, in per cent of the reference: `+0.4 %`."""
     if value is None or not reference or not (isfinite(value) and isfinite(reference)):
         return ABSENT
-    return f"{100.0 * (value / reference - 1.0):+.1f} %"
+    return f"{100.0 * (value / reference - 1.0):+z.1f} %"
 
 
 def measurement(value: float, uncertainty: float, unit: str) -> str:

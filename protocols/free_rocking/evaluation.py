@@ -156,7 +156,7 @@ def _motion(tilt: Tilt, uncertain: Array, number: int) -> FitFinished:
         name: FittedParameter(float(value), float(uncertainty), _UNITS[name])
         for name, value, uncertainty in zip(NAMES, fit.values, uncertain, strict=True)
     }
-    text = f"exact motion of tilt {number}: r = {r:.6f} +- {u:.1g} (k = 1) from {fit.impacts} impacts"
+    text = f"exact motion: r = {r:.6f} +- {u:.1g} (k = 1) from {fit.impacts} impacts"
     return FitFinished(f"tilt {number}", text, columns, parameters)
 
 
@@ -181,7 +181,7 @@ def _impacts(tilt: Tilt, alone: Findings, number: int) -> FitFinished:
             points.impact_uncertainty[1 : count + 1], "s", "standard uncertainty of the time from noise"
         ),
     }
-    text = f"impacts of tilt {number}: r = {relation.restitution:.5f} +- {alone.relation.uncertainty:.1g} (k = 1)"
+    text = f"r = {relation.restitution:.5f} +- {alone.relation.uncertainty:.1g} (k = 1)"
     found = {"restitution": FittedParameter(relation.restitution, alone.relation.uncertainty, "1")}
     return FitFinished(f"impacts of tilt {number}", text, columns, found)
 

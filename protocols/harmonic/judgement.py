@@ -295,4 +295,4 @@ def _remarks(
 
 def _amplitude_remark(table: Settled | Held) -> Iterator[str]:
     if abs(table.amplitude_error) > AMPLITUDE_NOTE:
-        yield f"the table's amplitude has an error of {100.0 * table.amplitude_error:+.2f} %"
+        yield f"the table's amplitude has an error of {100.0 * table.amplitude_error:+z.2f} %"

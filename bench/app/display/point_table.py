@@ -73,7 +73,7 @@ class Measured:
         if isfinite(self.low) and isfinite(self.high):
             predicted = texts.INTERVAL.format(value=predicted, low=factor * self.low, high=factor * self.high)
         off = self.value - self.predicted
-        share = f" ({100.0 * off / self.predicted:+.1f} %)" if isfinite(off) and self.predicted else ""
+        share = f" ({100.0 * off / self.predicted:+z.1f} %)" if isfinite(off) and self.predicted else ""
         return (
             self.point,
             self.quantity,

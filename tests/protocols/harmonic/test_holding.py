@@ -25,6 +25,17 @@ def point(folder: Path, *options: str) -> dict[str, Any]:
     return found
 
 
+def replayed_and_analysed(path: Path, held: dict[str, Any], capsys: pytest.CaptureFixture[str]) -> dict[str, Any]:
+    """The point of a file that replays to the last bit, analysed again: held, with the same gain."""
+    assert main(["replay", str(path)]) == 0
+    assert "Bit-identical to the file" in "".join(capsys.readouterr())
+    assert main(["analyse", str(path), "--json"]) == 0
+    (again,) = json.loads(capsys.readouterr().out)["points"]
+    assert again["status"] == "held"
+    assert again["alpha_2"] == pytest.approx(held["alpha_2"], rel=2e-3)
+    return again
+
+
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("hold") / "run"
@@ -66,13 +77,7 @@ def test_the_file_has_every_cycle_of_the_hold(held: dict[str, Any], folder: Path
 def test_the_file_replays_to_the_last_bit_and_its_hold_is_analysed_again(
     held: dict[str, Any], folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    file = str(folder / "campaign.h5")
-    assert main(["replay", file]) == 0
-    assert "Bit-identical to the file" in "".join(capsys.readouterr())
-    assert main(["analyse", file, "--json"]) == 0
-    (again,) = json.loads(capsys.readouterr().out)["points"]
-    assert again["status"] == "held"
-    assert again["alpha_2"] == pytest.approx(held["alpha_2"], rel=2e-3)
+    replayed_and_analysed(folder / "campaign.h5", held, capsys)
 
 
 def test_the_multiplier_is_measured_after_the_release(held: dict[str, Any]) -> None:

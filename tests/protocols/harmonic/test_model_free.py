@@ -1,12 +1,10 @@
 """A hold without the model of specimen and table on the simulated bench, through engine, guard and sensors."""
 
-import json
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from bench.app.cli.main import main
 from bench.config.model import BenchConfiguration
 from bench.control.cycle_identification import EXCITATION, EXCITED
 from bench.control.oscillator import Segment
@@ -17,7 +15,7 @@ from protocols.harmonic.approach import PAUSE, with_pause
 from protocols.harmonic.campaign import HarmonicCampaign
 from protocols.harmonic.protocol import HarmonicParameters
 from sim.errors import InvalidInput
-from tests.protocols.harmonic.test_holding import point
+from tests.protocols.harmonic.test_holding import point, replayed_and_analysed
 
 pytestmark = pytest.mark.usefixtures("shared_results")
 
@@ -57,13 +55,7 @@ def test_the_file_states_excitation_and_identified_maps(held: dict[str, Any], fo
 def test_the_file_replays_to_the_last_bit_and_its_hold_is_analysed_again(
     held: dict[str, Any], folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    file = str(folder / "campaign.h5")
-    assert main(["replay", file]) == 0
-    assert "Bit-identical to the file" in "".join(capsys.readouterr())
-    assert main(["analyse", file, "--json"]) == 0
-    (again,) = json.loads(capsys.readouterr().out)["points"]
-    assert (again["status"], again["model_free"]) == ("held", True)
-    assert again["alpha_2"] == pytest.approx(held["alpha_2"], rel=2e-3)
+    assert replayed_and_analysed(folder / "campaign.h5", held, capsys)["model_free"] is True
 
 
 def test_a_second_start_pauses_where_the_orbit_is_stable() -> None:

@@ -225,6 +225,7 @@ def test_nothing_is_drawn_without_a_change_and_at_most_eight_times_a_second():
         (plus_minus(0.5, None), "0.5000"),
         (plus_minus(NAN, 0.1), "-"),
         (difference(1.02, 1.0), "+2.0 %"),
+        (difference(1.0 - 1e-6, 1.0), "+0.0 %"),
         (difference(1.0, None), "-"),
         (one_line("a\n b\x07\tc"), "a b c"),
     ],
