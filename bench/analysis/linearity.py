@@ -15,7 +15,7 @@ from the result: it is part of the uncertainty, as an uncorrected effect (GUM F.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from math import exp, pi, sqrt
 
@@ -68,8 +68,13 @@ class Harmonics:
     readings: Array
     found: NDArray[np.complex128]
     uncertainty: Array
+    _enlarged: "dict[float, Harmonics]" = field(default_factory=lambda: _none(), init=False, repr=False)
 
-    @lru_cache(maxsize=64)  # noqa: B019 - few objects, used for many gains
+    @property
+    def swing(self) -> float:
+        """Span of the readings [m]."""
+        return float(np.ptp(self.readings))
+
     def rounded(self, step: float) -> "Harmonics":
         """The harmonics with the additional uncertainty due to the `step` [m] of the readings, at most that of one
         rounding. Returns the same object for the same step.
@@ -78,20 +83,38 @@ class Harmonics:
         `bench.analysis.gain.PEAK_ROUNDINGS`, the variance of one harmonic is 2 zeta(3) q^3 / (pi^4 A), half of it in
         each part.
         """
-        swing = max(0.5 * float(np.ptp(self.readings)), step, np.finfo(np.float64).tiny)
+        swing = max(0.5 * self.swing, step, np.finfo(np.float64).tiny)
         rounding = min(sqrt(ZETA_3 * step**3 / (pi**4 * swing)), step / sqrt(12.0))
         return self.with_uncertainty(rounding)
 
-    @lru_cache(maxsize=64)  # noqa: B019 - as above
     def with_uncertainty(self, uncertainty: float) -> "Harmonics":
         """The harmonics with an additional standard `uncertainty` [m] of each part. Returns the same object for the
-        same uncertainty.
+        same uncertainty, so that what is computed from it can be cached.
         """
-        return replace(self, uncertainty=np.hypot(self.uncertainty, uncertainty))
+        if uncertainty not in self._enlarged:
+            self._enlarged[uncertainty] = replace(self, uncertainty=np.hypot(self.uncertainty, uncertainty))
+        return self._enlarged[uncertainty]
+
+
+def _none() -> dict[float, Harmonics]:
+    return {}
 
 
 Checks = tuple[Harmonics, Harmonics]
 """Harmonics of both lasers' readings in one test."""
+
+MOST = 8
+"""Largest number of tests whose harmonics are evaluated: the time grows with its third power, and further tests with
+smaller swings hardly contribute.
+"""
+
+
+def widest(checks: Sequence[Harmonics]) -> Sequence[Harmonics]:
+    """At most `MOST` of the checks, those with the widest swings, in their order."""
+    if len(checks) <= MOST:
+        return checks
+    kept = sorted(range(len(checks)), key=lambda k: checks[k].swing, reverse=True)[:MOST]
+    return [checks[k] for k in sorted(kept)]
 
 
 @dataclass(frozen=True)
@@ -191,7 +214,7 @@ class _Posterior:
     likely: Array
 
 
-@lru_cache(maxsize=32)
+@lru_cache(maxsize=4)
 def _posterior(checks: tuple[Harmonics, ...], limit: float, whole: float) -> _Posterior:
     places = np.concatenate([each.readings for each in checks])
     observed = _rows([_fourier(each.readings.size, each.found.size) for each in checks])

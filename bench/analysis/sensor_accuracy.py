@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.analysis.laser_calibration import LaserCalibration
-from bench.analysis.linearity import SMOOTH, Checks, Effect, LinearityErrors, linearity_errors
+from bench.analysis.linearity import SMOOTH, Checks, Effect, LinearityErrors, linearity_errors, widest
 from sim.parameters import Parameters, quantity
 
 Array = NDArray[np.float64]
@@ -174,7 +174,8 @@ class SensorUncertainty:
         limit = self.accuracy.laser_linearity * whole
         effects = [each.effect(laser) for each in seen]
         if self.calibration is None:
-            checks = [each[laser].rounded(self.accuracy.laser_resolution) for each in self.checks]
+            step = self.accuracy.laser_resolution
+            checks = [each.rounded(step) for each in widest([both[laser] for both in self.checks])]
             return linearity_errors(effects, _shares(seen), limit, whole, checks)
         found = self.calibration.lasers[laser]
         low, high = found.lowest - found.rest, found.highest - found.rest
@@ -205,9 +206,10 @@ class SensorUncertainty:
             effects.append(Effect(places, np.append(-first.weights, second.weights)))
         # the harmonics that remain in the corrected readings of the bare frame check the reference sensor
         curves, step = self.calibration.lasers, self.accuracy.laser_resolution
+        kept = [widest([both[laser] for both in self.checks]) for laser in (0, 1)]
         checks = [
             each.rounded(step).with_uncertainty(curve.uncertainty)
-            for test in self.checks
+            for test in zip(*kept, strict=True)
             for each, curve in zip(test, curves, strict=True)
         ]
         limit = self.calibration.common_linearity

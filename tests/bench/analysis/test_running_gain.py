@@ -6,7 +6,7 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 
-from bench.analysis import remaining_transient, sensor_accuracy
+from bench.analysis import linearity, remaining_transient, sensor_accuracy
 from bench.analysis.gain import SteadyPeak, gain
 from bench.analysis.linearity import Harmonics
 from bench.analysis.running_gain import CHANGED, RunningGain, shared_draws
@@ -92,3 +92,20 @@ def test_the_modes_of_a_transient_are_computed_once_for_each_number_of_cycles() 
             series = 0.01 * (1.0 + 0.9 ** np.arange(13) + 1e-4 * random.standard_normal(13))
             remaining_transient.remaining_transient(series, 11)
     assert inverted.call_count <= 1 + 5, "the grid, and few refinements of it"
+
+
+def test_a_campaign_of_many_frequencies_evaluates_its_checks_once_and_at_most_so_many() -> None:
+    """A sweep over 50 frequencies: a look takes milliseconds, and memory does not grow with their number squared."""
+    bares = [checked(peak(0.01 + 0.0005 * k), 1.5) for k in range(50)]
+    checks = tuple(each.checks for each in bares if each.checks is not None)
+    linearity._posterior.cache_clear()
+    sizes = list[int]()
+    for drift in (0.01, 0.02, 0.03):
+        # the plan hands its sensors over anew at every look
+        running = RunningGain(bares[-1], replace(SENSORS, checks=checks), SHARED)
+        running.of(peak(drift))
+        sizes.append(linearity._posterior.cache_info().misses)
+    assert sizes == [2, 2, 2], "both lasers once"
+    largest = linearity.widest([both[1] for both in checks])
+    assert [each.swing for each in largest] == [both[1].swing for both in checks[-linearity.MOST :]]
+    assert linearity.widest([both[0] for both in checks[:4]]) == [both[0] for both in checks[:4]]
