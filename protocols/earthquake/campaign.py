@@ -18,6 +18,7 @@ from bench.prediction.statements import ABOUT
 from bench.preflight.margins import Forecast
 from bench.protocol import Plan, Prepared, Result, Sources
 from protocols.earthquake.forecast import Combination, beyond_limits, combinations, forecast
+from protocols.earthquake.laser_check import laser_check
 from protocols.earthquake.measurement import STEP, Histories
 from protocols.earthquake.plan import EarthquakePlan
 from protocols.earthquake.protocol import EarthquakeParameters
@@ -41,6 +42,7 @@ class EarthquakeCampaign(Prepared[EarthquakeParameters]):
         self._stored = kept = None if stored is None else FileSources.stored(stored)
         self.table = TableSource.of(parameters, configuration, kept)
         self.shakings = shakings(parameters, configuration, kept)
+        self.check = laser_check(parameters, configuration)
         self._histories = Histories()
 
     @cached_property
@@ -63,7 +65,13 @@ class EarthquakeCampaign(Prepared[EarthquakeParameters]):
     @cached_property
     def forecast(self) -> Forecast:
         return forecast(
-            self.parameters, self.configuration, self.shakings, self.table, self.combinations, self.left_out
+            self.parameters,
+            self.configuration,
+            self.shakings,
+            self.table,
+            self.combinations,
+            self.left_out,
+            self.check,
         )
 
     @cached_property
@@ -79,7 +87,7 @@ class EarthquakeCampaign(Prepared[EarthquakeParameters]):
         kept = self._histories = Histories()
         targets = target_gains(self.curves, self.parameters.beta)
         plan = EarthquakePlan(
-            self.parameters, self.configuration, self.shakings, self.table, targets, self.left_out, kept
+            self.parameters, self.configuration, self.shakings, self.table, targets, self.left_out, kept, self.check
         )
         return self.collected(plan.steps())
 

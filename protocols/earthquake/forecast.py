@@ -22,6 +22,7 @@ from bench.preflight.demands import (
 from bench.preflight.margins import Forecast, Stage, bounds, margins
 from bench.preflight.motion import peaks, table_demands
 from bench.progress import Progress, counting, silent
+from protocols.earthquake.laser_check import LaserCheck
 from protocols.earthquake.plan import Pace
 from protocols.earthquake.protocol import EarthquakeParameters
 from protocols.earthquake.records import LeftOut, Shaking
@@ -183,10 +184,15 @@ def forecast(
     table: TableSource,
     found: Sequence[Combination],
     left_out: LeftOut,
+    check: LaserCheck | None = None,
 ) -> Forecast:
-    """Demands of the identification and of the played combinations, with a warning for each omitted one."""
+    """Demands of the identification, of the check of the lasers and of the played combinations, with a warning for each
+    omitted one.
+    """
     played = [each.demands for each in found if (each.record, each.beta) not in left_out]
     asked = [*_identification(table), *played]
+    if check is not None:
+        asked.append(_shaking_demands(check.shaking, configuration.known_specimen.bare(), configuration))
     omitted = tuple(
         f"{each.demands.name} is omitted: {left_out[each.record, each.beta]}"
         for each in found
@@ -195,9 +201,12 @@ def forecast(
     return Forecast(
         demands=tuple(demand(quantity, asked, _UNKNOWN) for quantity in bounds(configuration)),
         stages=tuple(Stage(each.name, (), each.chance) for each in asked),
-        duration=Pace(parameters, shakings, table.duration, left_out).total,
+        duration=Pace(parameters, shakings, table.duration, left_out, check).total,
         warnings=(*omitted, *table_warnings(parameters, configuration, table.model)),
-        notes=tuple(f"{shaking.name}: {'; '.join(shaking.prepared.steps)}" for shaking in shakings),
+        notes=tuple(
+            f"{shaking.name}: {'; '.join(shaking.prepared.steps)}"
+            for shaking in (*([] if check is None else [check.shaking]), *shakings)
+        ),
     )
 
 

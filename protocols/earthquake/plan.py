@@ -1,7 +1,8 @@
 """Steps of the seismic campaign (section 5 of the paper).
 
-1. With the bare frame, the table is identified unless it is known. Then, for every record, the drive is iterated until
-   the table follows the record, and is played once more for the measurement.
+1. With the bare frame, the table is identified unless it is known, and the lasers are checked if this is requested.
+   Then, for every record, the drive is iterated until the table follows the record, and is played once more for the
+   measurement.
 2. Each spring is mounted in turn, and every record is played with the drive found with the bare frame. If the block
    topples, the record is ended and the block is set upright.
 
@@ -16,9 +17,10 @@ from math import tau
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.analysis.linearity import Checks
 from bench.analysis.signals import ACCELERATION, DRIFT
 from bench.config.model import BenchConfiguration
-from bench.control.replication import ReplicationParameters
+from bench.control.replication import Replication, ReplicationParameters
 from bench.control.table_model import TableModel
 from bench.engine.steps import Arm, Done, Fallen, OperatorAction, Outcome, Play, Played, Publish, RampOut, Step, Watch
 from bench.events import Event, PointFinished, Progress, StepStarted, Warned
@@ -26,6 +28,7 @@ from bench.protocol import each_step
 from drivers.rig import OperatorTask, RigError
 from protocols.common.identification.plan import identified
 from protocols.common.replicate import replicate, table_motion
+from protocols.earthquake.laser_check import LaserCheck
 from protocols.earthquake.measurement import GainMonitor, Histories, History, observe, tracking
 from protocols.earthquake.points import (
     BareTest,
@@ -66,13 +69,19 @@ class Pace:
         shakings: Sequence[Shaking],
         identification: float = 0.0,
         left_out: Collection[tuple[str, float | None]] = (),
+        check: LaserCheck | None = None,
     ) -> None:
         self._each = {
             shaking.name: shaking.target.duration + parameters.decay + parameters.rest + BETWEEN for shaking in shakings
         }
         self._bare = {name: 0 if (name, None) in left_out else parameters.passes + 1 for name in self._each}
+        if check is not None:
+            self._each[check.shaking.name] = check.shaking.target.duration + parameters.decay + parameters.rest
+            self._bare[check.shaking.name] = 1
         self._identification = identification
-        springs = {name: sum((name, beta) not in left_out for beta in parameters.beta) for name in self._each}
+        springs = dict.fromkeys(self._each, 0) | {
+            shaking.name: sum((shaking.name, beta) not in left_out for beta in parameters.beta) for shaking in shakings
+        }
         self.total = identification + sum(
             (self._bare[name] + springs[name]) * each for name, each in self._each.items()
         )
@@ -110,12 +119,15 @@ class EarthquakePlan:
         targets: Mapping[tuple[str, float], float | None],
         left_out: LeftOut,
         histories: Histories,
+        check: LaserCheck | None = None,
     ) -> None:
         self._parameters, self._configuration, self._histories = parameters, configuration, histories
         self._specimen = configuration.known_specimen
         self._shakings, self._table = shakings, table
         self._targets, self._left_out = targets, left_out
-        self._pace = Pace(parameters, shakings, table.duration, left_out)
+        self._pace = Pace(parameters, shakings, table.duration, left_out, check)
+        self._check = check
+        self._checks: Checks | None = None
         self._bare: dict[str, BareTest | str] = {}
         self._shortfalls: dict[str, str] = {}
         self._points = 0
@@ -123,6 +135,8 @@ class EarthquakePlan:
     def steps(self) -> Generator[Step, Outcome, None]:
         """Steps of the complete campaign."""
         model = yield from table_model(self._table, self._configuration, self._pace)
+        if self._check is not None:
+            self._checks = yield from self._check_lasers(self._check, model)
         for shaking in self._shakings:
             if (omitted := self._left_out.get((shaking.name, None))) is not None:
                 self._bare[shaking.name] = f"{OMITTED}: {omitted}"
@@ -132,6 +146,24 @@ class EarthquakePlan:
             yield Publish(self._pace.progress(f"{shaking.name} finished, bare frame"))
         for beta in self._parameters.beta:
             yield from self._spring(self._specimen.coupled(beta))
+
+    def _check_lasers(self, check: LaserCheck, model: TableModel) -> Generator[Step, Outcome, Checks | None]:
+        """Harmonics of the lasers' readings under a sine; None, with a warning, if it cannot be played or evaluated."""
+        shaking = check.shaking
+        yield Publish(StepStarted(f"{shaking.name}, bare frame: {'; '.join(shaking.prepared.steps)}"))
+        try:
+            # what the table adds to the sine is measured, so that its drive is not iterated
+            drive = Replication(shaking.target, model, self._configuration.limits).drive
+            outcome = yield from self._play(shaking, drive, GainMonitor(shaking.name, None, shaking.target.sample_rate))
+            if not isinstance(outcome, Played):
+                raise RigError(NO_BLOCK)
+            found = check.evaluate(outcome.signals, self._configuration)
+        except InvalidInput as refused:
+            yield Publish(Warned(f"the lasers are not checked, and the uncertainty of alpha_2 is larger: {refused}"))
+            found = None
+        self._pace.played(shaking.name)
+        yield Publish(self._pace.progress(f"{shaking.name} finished"))
+        return found
 
     def _bare_frame(self, shaking: Shaking, model: TableModel) -> Generator[Step, Outcome, BareTest | str]:
         """Test of the bare frame, or the reason why there is none."""
@@ -222,7 +254,16 @@ class EarthquakePlan:
             expected = History.of(specimen, observed.base).drift
             self._histories.coupled(shaking, specimen.label or 0.0, outcome.signals, expected)
             return measured_point(
-                shaking, specimen, bare, outcome.signals, observed, target, self._configuration, p.draws, seed
+                shaking,
+                specimen,
+                bare,
+                outcome.signals,
+                observed,
+                target,
+                self._configuration,
+                p.draws,
+                seed,
+                self._checks,
             )
         signals = bare.signals[:0] if outcome.signals is None else outcome.signals
         return overturned_point(shaking, specimen, bare, signals, target, self._configuration, p.draws, seed)

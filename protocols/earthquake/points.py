@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.analysis.linearity import Checks
 from bench.analysis.transient_base import ALIKE
 from bench.config.model import BenchConfiguration
 from bench.control.passes import Pass
@@ -65,9 +66,12 @@ def measured_point(
     configuration: BenchConfiguration,
     draws: int,
     seed: int,
+    checks: Checks | None = None,
 ) -> EarthquakePoint:
-    """Point of a record without toppling, compared with the model under both achieved motions."""
-    found = compare(bare.observed, observed, specimen, configuration, draws, seed)
+    """Point of a record without toppling, compared with the model under both achieved motions; `checks` are the result
+    of a check of the lasers.
+    """
+    found = compare(bare.observed, observed, specimen, configuration, draws, seed, checks)
     moved = tracking(shaking, signals)
     return EarthquakePoint.model_validate(
         {
@@ -149,6 +153,7 @@ def _remarks(found: Compared, observed: Observed) -> Iterator[str]:
         )
     elif found.chance > CHANCE_NOTE:
         yield f"the block did not topple, but it topples in {100.0 * found.chance:.0f} % of the draws"
+    yield from found.rough
     if found.agrees is False:
         yield "the difference from the prediction exceeds the uncertainty"
     if found.chaotic:

@@ -81,6 +81,12 @@ class EarthquakeParameters(Parameters):
     )
     decay: float = quantity(5.0, "s", "duration of the free vibration measured after a record", ge=0, le=120)
     rest: float = quantity(2.0, "s", "time at rest before a record, after the storeys have settled", ge=0.5, le=60)
+    laser_check: bool = quantity(
+        False,
+        "",
+        "whether a sine of the bare frame checks the linearity of the lasers before the records, which narrows the "
+        "uncertainty of alpha_2",
+    )
     draws: int = quantity(
         200,
         "1",

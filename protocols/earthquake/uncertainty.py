@@ -17,6 +17,7 @@ import numpy as np
 from numpy.random import SeedSequence
 from numpy.typing import NDArray
 
+from bench.analysis.linearity import Checks
 from bench.analysis.sensor_accuracy import Draws, PeakReadings, SensorUncertainty
 from bench.analysis.uncertainty import COVERAGE, Budget
 from bench.config.model import BenchConfiguration
@@ -56,6 +57,7 @@ class Compared:
     `bench` is the 95 % quantile of |measured - predicted| alpha_2 for an exactly known specimen; None if that specimen
     topples. `budget` holds the standard uncertainties of alpha_2 by contribution, each drawn alone, largest first;
     `chaotic` is set if their variances do not add up. `chance` is the predicted probability of toppling.
+    `rough` has a remark on each laser whose linearity error is not smooth, according to its check.
     """
 
     alpha_1: float
@@ -72,6 +74,7 @@ class Compared:
     budget: Budget
     chaotic: bool
     chance: float
+    rough: tuple[str, ...] = ()
 
     @property
     def agrees(self) -> bool | None:
@@ -85,10 +88,18 @@ class Compared:
 
 
 def compare(
-    bare: Observed, coupled: Observed, specimen: Specimen, configuration: BenchConfiguration, n: int, seed: int
+    bare: Observed,
+    coupled: Observed,
+    specimen: Specimen,
+    configuration: BenchConfiguration,
+    n: int,
+    seed: int,
+    checks: Checks | None = None,
 ) -> Compared:
-    """Compare the gains measured in two tests, bare and coupled, with the predicted gains of `n` draws."""
-    sensors = configuration.sensors
+    """Compare the gains measured in two tests, bare and coupled, with the predicted gains of `n` draws; `checks` are
+    the harmonics of the lasers' readings under a sine, if they were checked.
+    """
+    sensors = configuration.sensors.checked_by(checks)
     drifts, firsts = (bare.drift, coupled.drift), (bare.u1, coupled.u1)
     of_drift, of_u1, of_all, of_bench, of_parts = SeedSequence(seed).spawn(5)
     errors = drift_errors(drifts, sensors, n, of_drift)
@@ -129,6 +140,7 @@ def compare(
         budget=Budget(parts),
         chaotic=bool(stood.size) and apart > CHAOTIC * float(np.var(stood)),
         chance=everything.chance,
+        rough=sensors.rough(sensors.shapes([_sighting(each) for each in drifts])),
     )
 
 

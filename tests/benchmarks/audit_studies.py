@@ -66,8 +66,8 @@ RECORDS = (("l-aquila", 0.25), ("l-aquila", 0.97), ("pacoima", 0.25), ("pacoima"
 """Synthetic records and stiffness ratios of the peak drift ratio."""
 
 
-def _record(seed: int, name: str, beta: float, case: str) -> Outcome:
-    return {"alpha_2": coverage_record.measured(seed, name, beta, CASES[case]).estimate}
+def _record(seed: int, name: str, beta: float, case: str, *, checked: bool = False) -> Outcome:
+    return {"alpha_2": coverage_record.measured(seed, name, beta, CASES[case], checked=checked).estimate}
 
 
 FRAME = {"k1": "k₁", "k2": "k₂", "xi1": "ξ₁", "xi2": "ξ₂", "omega1": "ω₁", "omega2": "ω₂"}
@@ -129,6 +129,17 @@ def studies() -> dict[str, Study]:
             3.5 if case == "calibrated" else 0.3,
         )
         for case, records in (("default", RECORDS), ("short waves", RECORDS[::3]), ("calibrated", RECORDS[:1]))
+        for name, beta in records
+    ]
+    found += [
+        Study(
+            f"record, {case}, checked, {name}, {beta:g}",
+            f"synthetic {name}, β {beta:.2f}, {HARMONIC[case][0]}, with `--laser-check`",
+            alpha_2,
+            partial(_record, name=name, beta=beta, case=case, checked=True),
+            0.5,
+        )
+        for case, records in (("default", RECORDS), ("smooth", RECORDS), ("short waves", RECORDS[::3]))
         for name, beta in records
     ]
     found += [

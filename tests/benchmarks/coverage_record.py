@@ -10,7 +10,10 @@ import numpy as np
 from bench.accelerograms.reference import RecordReference
 from bench.analysis.sensor_accuracy import SensorUncertainty
 from bench.analysis.table_motion import table_motion, with_final_rest
+from bench.config.model import BenchConfiguration
+from protocols.earthquake.laser_check import LaserCheck, laser_check
 from protocols.earthquake.measurement import observe
+from protocols.earthquake.protocol import EarthquakeParameters
 from protocols.earthquake.uncertainty import drift_errors
 from protocols.harmonic.protocol import HarmonicParameters
 from sim.excitation import SampledRecord
@@ -23,6 +26,9 @@ LOWEST, STRENGTH = 0.8, 1.3
 """Lowest frequency of a record [Hz], and its peak over the uplift acceleration."""
 
 DRAWS = 4000
+
+DISTORTION = 0.01
+"""Third harmonic of the table under the sine that checks the lasers, which is not controlled."""
 
 
 def table_record(acceleration: Array, dt: float) -> Array:
@@ -41,9 +47,25 @@ def motion_under(name: str, beta: float | None) -> Motion:
     specimen = Specimen() if beta is None else Specimen().coupled(beta)
     acceleration = table_record(record.acceleration, record.dt)
     acceleration *= STRENGTH * specimen.uplift_acceleration / np.abs(acceleration).max()
-    t = np.arange(0.0, (acceleration.size - 1) * record.dt, 1.0 / RATE)
-    a = np.interp(t, np.arange(acceleration.size) * record.dt, acceleration)
-    moved = simulate(specimen, SampledRecord(acceleration, record.dt), sample_times=t, tolerance=1e-9).samples
+    return _moved(specimen, acceleration, record.dt)
+
+
+@lru_cache(maxsize=1)
+def check_and_motion() -> tuple[LaserCheck, Motion]:
+    """The check of the lasers that the protocol makes, and the motion of the bare frame under it, for a table with a
+    third harmonic of `DISTORTION`.
+    """
+    check = laser_check(EarthquakeParameters(laser_check=True), BenchConfiguration())
+    assert check is not None
+    sine, amplitude = check.shaking.target.acceleration, check.amplitude
+    sine = sine + DISTORTION * (3.0 * sine - 4.0 * sine**3 / amplitude**2)
+    return check, _moved(Specimen(), sine, 1.0 / RATE)
+
+
+def _moved(specimen: Specimen, acceleration: Array, dt: float) -> Motion:
+    t = np.arange(0.0, (acceleration.size - 1) * dt, 1.0 / RATE)
+    a = np.interp(t, np.arange(acceleration.size) * dt, acceleration)
+    moved = simulate(specimen, SampledRecord(acceleration, dt), sample_times=t, tolerance=1e-9).samples
     assert moved is not None
     assert len(moved) == len(t), "the block topples"
     velocity, displacement = table_motion(a, 1.0 / RATE)
@@ -58,13 +80,20 @@ class Measured:
     parts: dict[str, float]
 
 
-def measured(seed: int, name: str, beta: float, case: Case) -> Measured:
-    """The peak drift ratio of one bench, coupled over bare; the true one is that of the motions."""
+def measured(seed: int, name: str, beta: float, case: Case, *, checked: bool = False) -> Measured:
+    """The peak drift ratio of one bench, coupled over bare, with its lasers `checked` or not; the true one is that of
+    the motions.
+    """
     bare, coupled = motion_under(name, None), motion_under(name, beta)
     sensors = Sensors(seed, case)
     found = sensors.calibrated() if case.calibrated else None
+    checks = None
+    if checked:
+        check, moved = check_and_motion()
+        checks = check.evaluate(sensors.signals(moved, found)[REST:], BenchConfiguration())
     seen = [observe(sensors.signals(motion, found), REST, RATE).drift for motion in (bare, coupled)]
-    drawn = drift_errors((seen[0], seen[1]), SensorUncertainty(ACCURACY, RANGES, found), DRAWS, seed)
+    accuracy = SensorUncertainty(ACCURACY, RANGES, found).checked_by(checks)
+    drawn = drift_errors((seen[0], seen[1]), accuracy, DRAWS, seed)
     together = np.sum(list(drawn.values()), axis=0)
     ratio = seen[1].peak.value / seen[0].peak.value
     return Measured(

@@ -1,0 +1,143 @@
+"""The check of the lasers before the records: its sine, and the uncertainty of alpha_2 with and without it."""
+
+import json
+from math import tau
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from bench.analysis.signals import ACCELERATION, DRIFT, LASER_1, LASER_2, SIGNALS
+from bench.app.cli.main import main
+from bench.config.model import BenchConfiguration
+from bench.control.target import Reach
+from bench.datafile.reader import open_datafile
+from protocols.common.sine.settling import linear_frame
+from protocols.earthquake.laser_check import ABOVE, INSIDE, LaserCheck, laser_check
+from protocols.earthquake.protocol import EarthquakeParameters
+from sim.errors import InvalidInput
+from sim.linear import steady_response
+from tests.protocols.earthquake.test_campaign import bench as bench
+
+CONFIGURATION = BenchConfiguration()
+
+
+def check_of(**parameters: Any) -> LaserCheck:
+    found = laser_check(EarthquakeParameters(laser_check=True, **parameters), CONFIGURATION)
+    assert found is not None
+    return found
+
+
+def test_no_check_is_made_unless_it_is_requested() -> None:
+    assert laser_check(EarthquakeParameters(), CONFIGURATION) is None
+
+
+def test_the_sine_uses_most_of_a_limit_and_exceeds_none() -> None:
+    check, limits, reach = check_of(), CONFIGURATION.limits, Reach.of(CONFIGURATION)
+    frame = CONFIGURATION.known_specimen.bare()
+    assert check.omega == pytest.approx(ABOVE * min(frame.frame.natural_frequencies))
+    first, second = (abs(each) for each in steady_response(frame, check.omega, check.amplitude))
+    table = check.amplitude / check.omega**2
+    drift = abs(np.subtract(*steady_response(frame, check.omega, check.amplitude)))
+    shares = [drift / limits.drift, table / reach.displacement]
+    shares += [
+        abs(each - table) / half for each, half in zip((first, second), CONFIGURATION.laser_half_ranges, strict=True)
+    ]
+    assert 0.5 < max(shares) < 0.9
+    target = check.shaking.target
+    assert check.shaking.prepared.peak == pytest.approx(check.amplitude, rel=0.01)
+    assert np.abs(target.acceleration[[0, -1]]).max() < 1e-3 * check.amplitude
+    # the evaluated part is a pure sine
+    part = target.acceleration[check.first :][: round(20.0 * tau / check.omega * target.sample_rate)]
+    spectrum = np.abs(np.fft.rfft(part * np.hanning(part.size)))
+    assert spectrum[40:].max() < 1e-4 * spectrum.max()
+
+
+def test_a_band_above_the_first_mode_moves_the_sine_into_it_and_a_narrow_one_is_refused() -> None:
+    assert check_of(table_band="2:25").omega == pytest.approx(INSIDE * tau * 2.0)
+    with pytest.raises(InvalidInput, match="laser-check"):
+        check_of(table_band="2:2.5")
+
+
+def signals_of(check: LaserCheck, error: float) -> np.ndarray:
+    """Signals of a linear frame in its steady state, with an `error` [m] times the square of the relative reading of
+    the first laser.
+    """
+    target = check.shaking.target
+    signals = np.zeros((target.acceleration.size, len(SIGNALS)))
+    phase = check.omega * np.arange(len(signals)) / target.sample_rate
+    signals[:, ACCELERATION] = check.amplitude * np.sin(phase)
+    first, second = linear_frame(CONFIGURATION).readings(check.omega, check.amplitude)
+    relative = np.imag(first * np.exp(1j * phase)) / abs(first)
+    signals[:, LASER_1] = abs(first) * relative + error * relative**2
+    signals[:, LASER_2] = np.imag(second * np.exp(1j * phase))
+    signals[:, DRIFT] = signals[:, LASER_2] - signals[:, LASER_1]
+    return signals
+
+
+def test_harmonics_are_those_of_the_error_of_a_laser() -> None:
+    check, error = check_of(), 1e-4
+    first, second = check.evaluate(signals_of(check, error), CONFIGURATION)
+    # the square of a sine is (1 - cos(2 phase)) / 2
+    assert abs(first.found[0]) == pytest.approx(0.5 * error, rel=1e-3)
+    assert np.abs(first.found[1:]).max() < 1e-9
+    assert np.abs(second.found).max() < 1e-9
+    assert second.swing == pytest.approx(
+        2.0 * abs(linear_frame(CONFIGURATION).readings(check.omega, check.amplitude)[1]), rel=1e-3
+    )
+
+
+def test_a_check_with_too_many_missing_samples_is_refused() -> None:
+    check = check_of()
+    signals = signals_of(check, 0.0)
+    signals[check.first :: 50] = np.nan
+    signals[check.first :][: round(20.0 * tau / check.omega * check.shaking.target.sample_rate)] = np.nan
+    with pytest.raises(InvalidInput, match="laser check"):
+        check.evaluate(signals, CONFIGURATION)
+
+
+def test_a_check_that_fails_leaves_the_campaign_without_it(
+    bench: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def evaluate(*_arguments: object) -> None:
+        raise InvalidInput("laser check", "3 cycles", "at least 12 without missing samples are required")
+
+    monkeypatch.setattr(LaserCheck, "evaluate", evaluate)
+    point = run(tmp_path / "run", bench, "--laser-check")
+    assert point["status"] == "measured"
+    with open_datafile(tmp_path / "run" / "campaign.h5") as record:
+        warned = [event.text for event in record.events if event.kind == "Warned"]
+    assert any("the lasers are not checked" in text and "3 cycles" in text for text in warned)
+
+
+def run(folder: Path, bench: Path, *options: str) -> dict[str, Any]:
+    asked = [
+        "synthetic:l-aquila",
+        "--table-band",
+        "1:25",
+        "--beta",
+        "0.25",
+        "--draws",
+        "40",
+        "--seed",
+        "4",
+        "--config",
+        str(bench),
+    ]
+    assert main(["run", "earthquake", *asked, *options, "--json", "--out", str(folder)]) == 0
+    (point,) = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["points"]
+    return point
+
+
+def test_a_check_narrows_the_uncertainty_and_the_file_replays(
+    bench: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    without = run(tmp_path / "without", bench)
+    checked = run(tmp_path / "checked", bench, "--laser-check")
+    assert checked["agrees"] is True
+    assert checked["alpha_2"] == pytest.approx(without["alpha_2"], rel=0.005)
+    assert checked["alpha_2_uncertainty"] < 0.4 * without["alpha_2_uncertainty"]
+    capsys.readouterr()
+    assert main(["replay", str(tmp_path / "checked" / "campaign.h5")]) == 0
+    assert "Bit-identical to the file" in "".join(capsys.readouterr())
