@@ -63,7 +63,7 @@ WORDING = 9
 same version.
 """
 
-INTERVALS = 3
+INTERVALS = 4
 """Version of the evaluation of uncertainties. Replay compares uncertainties only with those of a file of the same
 version.
 """

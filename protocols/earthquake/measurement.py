@@ -1,6 +1,6 @@
 """Measured and predicted response to a played record: table motion, peaks, overturning, running gain and histories."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import nan
 
 import numpy as np
@@ -14,6 +14,7 @@ from bench.control.passes import SpectrumCheck
 from bench.control.starts import CATCH_ANGLE
 from bench.live_values import RunningGain
 from protocols.earthquake.records import Shaking
+from sim.errors import InvalidInput
 from sim.rocking import simulate
 from sim.specimen import Specimen
 
@@ -31,7 +32,8 @@ class PeakSeen:
 
     `lasers` [m] are the readings of the lasers and `table` [m] the table's displacement, both positive in the direction
     of the peak; `speeds` [m/s] are the rates of change of the lasers' signals, and `swings` [m] the ranges of these
-    signals within the fit window.
+    signals within the fit window. `others` are peaks of other half cycles that are almost as large: the largest true
+    one may be among them.
     """
 
     peak: TransientPeak
@@ -39,6 +41,7 @@ class PeakSeen:
     speeds: tuple[float, float]
     swings: tuple[float, float]
     table: float
+    others: tuple["PeakSeen", ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,10 +61,41 @@ def observe(signals: Array, rest: int, sample_rate: float) -> Observed:
     still = signals[: round(QUIET * rest)]
     return Observed(
         base=base_motion(signals, still, sample_rate),
-        drift=_sensor_peak(signals, still, DRIFT, sample_rate),
+        drift=_with_others(_sensor_peak(signals, still, DRIFT, sample_rate), signals, still, sample_rate),
         u1=_sensor_peak(signals, still, U1, sample_rate),
         history=signals[:, DRIFT],
     )
+
+
+NEAR = 0.02
+"""Relative difference from the largest peak up to which another peak may be larger, given the errors of the lasers."""
+
+_MOST = 4
+
+
+def _with_others(seen: PeakSeen, signals: Array, still: Array, sample_rate: float) -> PeakSeen:
+    """The peak of the drift with those of other half cycles that are at most `NEAR` smaller."""
+    others, last = list[PeakSeen](), seen
+    left = signals.copy()
+    while len(others) < _MOST:
+        _remove(left[:, DRIFT], last.peak, sample_rate)
+        try:
+            last = _sensor_peak(left, still, DRIFT, sample_rate)
+        except InvalidInput:
+            break
+        if last.peak.value < (1.0 - NEAR) * seen.peak.value:
+            break
+        others.append(last)
+    return replace(seen, others=tuple(others))
+
+
+def _remove(values: Array, peak: TransientPeak, sample_rate: float) -> None:
+    """Clip the half cycle of a peak at half its height."""
+    place, half = round(peak.time * sample_rate), 0.5 * peak.sign * peak.value
+    beyond = np.flatnonzero(~(peak.sign * values > abs(half)))
+    end = int(np.searchsorted(beyond, place))
+    begin = int(beyond[end - 1]) + 1 if end else 0
+    values[begin : int(beyond[end]) if end < beyond.size else values.size] = half
 
 
 def _sensor_peak(signals: Array, still: Array, column: int, sample_rate: float) -> PeakSeen:

@@ -193,16 +193,33 @@ Array = NDArray[np.float64]
 NOISE = "noise of the peaks"
 """Name of the contribution that is independent in the two tests."""
 
+CHOICE = "choice of the largest peak"
+"""Name of the contribution due to other peaks of almost the same size."""
+
 
 def drift_errors(
     peaks: tuple[PeakSeen, PeakSeen], sensors: SensorUncertainty, n: int, seed: int | SeedSequence
 ) -> dict[str, Array]:
-    """Drawn relative errors of the drift peaks, bare and coupled, by contribution, shape (2, n) each."""
+    """Drawn relative errors of the drift peaks, bare and coupled, by contribution, shape (2, n) each.
+
+    For checked or calibrated lasers they include the choice of the largest peak among several of almost the same size,
+    whose linearity errors differ. Without either, the most unfavourable shape covers it.
+    """
     random = np.random.default_rng(seed)
     noise = np.array([_noise(peak, random, n) for peak in peaks])
-    drifts = np.array([[peak.peak.value] for peak in peaks])
-    errors = sensors.drift_errors([_sighting(peak) for peak in peaks], Draws(random, n))
-    return {NOISE: noise} | {name: each / drifts for name, each in errors.items()}
+    known = bool(sensors.checks) or sensors.calibration is not None
+    others = [(test, other) for test, peak in enumerate(peaks) for other in peak.others] if known else []
+    seen = [*peaks, *(other for _, other in others)]
+    drifts = np.array([[each.peak.value] for each in seen])
+    errors = sensors.drift_errors([_sighting(each) for each in seen], Draws(random, n))
+    parts = {NOISE: noise} | {name: each[:2] / drifts[:2] for name, each in errors.items()}
+    if others:
+        true = drifts - np.sum(list(errors.values()), axis=0)
+        largest = true[:2].copy()
+        for (test, _), each in zip(others, true[2:], strict=True):
+            largest[test] = np.maximum(largest[test], each)
+        parts[CHOICE] = (true[:2] - largest) / drifts[:2]
+    return parts
 
 
 def u1_errors(

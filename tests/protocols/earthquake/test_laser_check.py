@@ -8,14 +8,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bench.analysis.signals import ACCELERATION, DRIFT, LASER_1, LASER_2, SIGNALS
+from bench.analysis.signals import ACCELERATION, DRIFT, LASER_1, LASER_2, SIGNALS, U1
 from bench.app.cli.main import main
 from bench.config.model import BenchConfiguration
 from bench.control.target import Reach
 from bench.datafile.reader import open_datafile
 from protocols.common.sine.settling import linear_frame
 from protocols.earthquake.laser_check import ABOVE, INSIDE, LaserCheck, laser_check
+from protocols.earthquake.measurement import observe
 from protocols.earthquake.protocol import EarthquakeParameters
+from protocols.earthquake.uncertainty import CHOICE, drift_errors
 from sim.errors import InvalidInput
 from sim.linear import steady_response
 from tests.protocols.earthquake.test_campaign import bench as bench
@@ -141,3 +143,28 @@ def test_a_check_narrows_the_uncertainty_and_the_file_replays(
     capsys.readouterr()
     assert main(["replay", str(tmp_path / "checked" / "campaign.h5")]) == 0
     assert "Bit-identical to the file" in "".join(capsys.readouterr())
+
+
+def test_another_peak_of_almost_the_same_size_adds_the_choice_between_them() -> None:
+    """A drift with peaks of 50 and -49.9 mm, at opposite places of laser 1, whose error was found by the check."""
+    rate, still = 1000.0, 2000
+    time = np.arange(10_000) / rate
+    signals = np.zeros((time.size, len(SIGNALS)))
+    pulse = [height * np.exp(-(((time - at) / 0.1) ** 2)) for height, at in ((0.05, 4.0), (-0.0499, 6.0), (0.045, 8.0))]
+    signals[:, LASER_1] = -np.sum(pulse, axis=0)
+    signals[:, DRIFT] = -signals[:, LASER_1] + 1e-6 * np.random.default_rng(1).standard_normal(time.size)
+    signals[:, U1] = signals[:, DRIFT]
+    signals[:, ACCELERATION] = np.sin(20.0 * time) * (time > 2.0)
+    seen = observe(signals, still, rate).drift
+    assert seen.peak.value == pytest.approx(0.05, rel=1e-4)
+    (other,) = seen.others
+    assert (other.peak.value, other.peak.sign) == (pytest.approx(0.0499, rel=1e-4), -1)
+    assert other.peak.time == pytest.approx(6.0, abs=1e-3)
+    sensors = CONFIGURATION.sensors
+    assert CHOICE not in drift_errors((seen, seen), sensors, 100, 1)
+    check = check_of()
+    checked = sensors.checked_by(check.evaluate(signals_of(check, 1e-4), CONFIGURATION))
+    choice = drift_errors((seen, seen), checked, 2000, 1)[CHOICE]
+    # the other peak is larger in some of the draws, and the largest is never smaller than the chosen one
+    assert choice.max() == 0.0
+    assert 0.05 < np.mean(choice < 0.0) < 0.95
