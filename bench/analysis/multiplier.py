@@ -10,7 +10,7 @@ multipliers the problem is linear, so that only these are iterated (variable pro
 Numer. Anal. 10, 1973); the matrix pencil (Hua and Sarkar, IEEE Trans. ASSP 38, 1990) provides their initial values.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import log, pi, tau
 
 import numpy as np
@@ -46,6 +46,11 @@ NEAR, FAR = 2, 6
 the residual is compared with its mean. At smaller distances, the fit reduces the residual.
 """
 
+EARLY = 6
+"""Ratio of the number of cycles to that of the first ones, without which the fit is repeated: most pairs that are not
+fitted have decayed by then.
+"""
+
 PASSES = 3
 """Number of fits; each after the first is weighted by the residual of the previous one."""
 
@@ -58,6 +63,9 @@ class Multiplier:
     """Dominant pair of multipliers: `modulus` per cycle and `angle` [rad] per cycle, from 0 to pi, with their standard
     uncertainties due to noise and their correlation.
 
+    `modulus_other` and `angle_other` are the standard uncertainties due to pairs that are not fitted: the changes of
+    modulus and angle without the first cycles, beyond those expected from noise.
+
     `cycles` is the number of cycles used, `pairs` the number of fitted pairs, `autocorrelation` that of the residual
     from one cycle to the next, and `coloured` the power of the residual near the angle of the pair, relative to its
     mean. Where it exceeds 1, the covariance is multiplied by it. `residual` is the rms residual of a coefficient, in
@@ -69,6 +77,8 @@ class Multiplier:
     angle: float
     angle_uncertainty: float
     correlation: float
+    modulus_other: float
+    angle_other: float
     cycles: int
     pairs: int
     autocorrelation: float
@@ -98,6 +108,28 @@ def dominant_multiplier(series: Array) -> Multiplier | None:
     """
     if not np.isfinite(series).all():
         raise ValueError("the series of coefficients has values that are not finite")
+    found = _dominant(series)
+    later = None if found is None else _dominant(series[series.shape[0] // EARLY :])
+    if found is None or later is None:
+        return found
+    return replace(
+        found,
+        modulus_other=_beyond_noise(
+            later.modulus - found.modulus, found.modulus_uncertainty, later.modulus_uncertainty
+        ),
+        angle_other=_beyond_noise(later.angle - found.angle, found.angle_uncertainty, later.angle_uncertainty),
+    )
+
+
+def _beyond_noise(change: float, uncertainty: float, of_part: float) -> float:
+    """Part of a `change` that is larger than expected from noise, between an estimate from all data and one from a part
+    of them, with these standard uncertainties (Hausman, Econometrica 46, 1978: the variance of the change is the
+    difference of the variances).
+    """
+    return max(change**2 - max(of_part**2 - uncertainty**2, 0.0), 0.0) ** 0.5
+
+
+def _dominant(series: Array) -> Multiplier | None:
     n = series.shape[0]
     if n < SHORTEST:
         return None
@@ -187,6 +219,8 @@ def _stated(fit: _Fit, size: float) -> Multiplier:
         angle=angle,
         angle_uncertainty=float(spread[1]),
         correlation=float(covariance[0, 1] / np.prod(spread)) * (1.0 if np.angle(dominant) >= 0.0 else -1.0),
+        modulus_other=0.0,
+        angle_other=0.0,
         cycles=n,
         pairs=fit.multipliers.size,
         autocorrelation=follows,

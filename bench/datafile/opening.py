@@ -63,7 +63,7 @@ WORDING = 9
 same version.
 """
 
-INTERVALS = 4
+INTERVALS = 5
 """Version of the evaluation of uncertainties. Replay compares uncertainties only with those of a file of the same
 version.
 """

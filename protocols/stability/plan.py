@@ -31,7 +31,7 @@ from protocols.common.sine.settling import Held, Report, Settled, settle_and_mea
 from protocols.stability.laws import LawPrediction, implied, law_prediction, predicted_columns
 from protocols.stability.prediction import Predicted, close_pair, predicted, rocking
 from protocols.stability.protocol import OrbitStatus, StabilityParameters, StabilityPoint
-from protocols.stability.release import Released, combined, parts_of, release
+from protocols.stability.release import Released, combined, known_norm, parts_of, release
 
 MOST_BISECTIONS = 12
 """Largest number of points added by the bisection."""
@@ -240,9 +240,11 @@ class StabilityPlan:
             )
             return StabilityPoint.model_validate({**values, "status": OrbitStatus.NOT_MEASURABLE, "reason": reason})
         scale = self._configuration.sensors.table_scale
-        parts, turned = parts_of(found, trial.predicted.slope, scale), trial.predicted.turn * scale
-        expanded, expected = COVERAGE * combined(parts), COVERAGE * trial.predicted.uncertainty
-        apart = abs(found.modulus - abs(trial.predicted.multiplier))
+        predicted = trial.predicted
+        parts = parts_of(found, (predicted.slope, predicted.slope_spread), scale)
+        turned = known_norm((predicted.turn, predicted.turn_spread)) * scale
+        expanded, expected = COVERAGE * combined(parts), COVERAGE * predicted.uncertainty
+        apart = abs(found.modulus - abs(predicted.multiplier))
         return StabilityPoint.model_validate(
             {
                 **values,
@@ -250,7 +252,7 @@ class StabilityPlan:
                 "modulus": found.modulus,
                 "modulus_uncertainty": expanded,
                 "angle_rad": found.angle,
-                "angle_uncertainty_rad": COVERAGE * hypot(found.angle_uncertainty, turned if turned == turned else 0.0),
+                "angle_uncertainty_rad": COVERAGE * hypot(found.angle_uncertainty, found.angle_other, turned),
                 "agrees": apart <= hypot(expanded, expected) if expected == expected else None,
                 **implied(trial.under, self._specimen.block.restitution_factor, found.modulus, expanded),
                 "uncertainty_parts": dumps({name: float(f"{part:.4g}") for name, part in parts.items()}),

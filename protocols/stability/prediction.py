@@ -29,7 +29,8 @@ CLOSE = 0.02
 class Predicted:
     """Dominant multiplier of an orbit: on `fixed` ground and, if the shaker is known, on the `table`. On fixed ground,
     `uncertainty` is the standard uncertainty of the modulus due to the specimen, and `slope` and `turn` [rad] are the
-    derivatives of modulus and angle with respect to the logarithm of the amplitude.
+    derivatives of modulus and angle with respect to the logarithm of the amplitude. `slope_spread` and `turn_spread`
+    are the standard uncertainties of these derivatives due to the specimen.
     """
 
     fixed: complex
@@ -37,6 +38,8 @@ class Predicted:
     uncertainty: float
     slope: float
     turn: float
+    slope_spread: float
+    turn_spread: float
 
     @property
     def multiplier(self) -> complex:
@@ -76,25 +79,46 @@ def on_table(orbit: Orbit, shaker: Shaker | None, harmonics: int) -> complex | N
 
 def predicted(orbit: Orbit, known: SpecimenKnowledge, shaker: Shaker | None, harmonics: int) -> Predicted:
     """Multiplier of `orbit`; its uncertainty is propagated to first order (GUM 5.1.4, note 2)."""
-    sides = [(_slowest(more, orbit), _slowest(less, orbit)) for more, less in known.deviations(orbit.specimen)]
-    more, less = (_slowest(orbit.specimen, orbit, 1.0 + step) for step in (STEP, -STEP))
+    moved = known.deviations(orbit.specimen)
+    sides = [(_slowest(more, orbit), _slowest(less, orbit)) for more, less in moved]
+    slopes = np.array([_slopes(more, orbit) - _slopes(less, orbit) for more, less in moved]).reshape(-1, 2)
+    slope, turn = _slopes(orbit.specimen, orbit)
+    slope_spread, turn_spread = np.linalg.norm(0.5 * slopes, axis=0)
     return Predicted(
         fixed=orbit.slowest,
         table=on_table(orbit, shaker, harmonics),
         uncertainty=hypot(*(0.5 * (abs(one) - abs(other)) for one, other in sides)),
-        slope=(abs(more) - abs(less)) / (2.0 * STEP),
-        turn=(phase(more) - phase(less)) / (2.0 * STEP),
+        slope=float(slope),
+        turn=float(turn),
+        slope_spread=float(slope_spread),
+        turn_spread=float(turn_spread),
     )
 
 
-def _slowest(specimen: Specimen, orbit: Orbit, factor: float = 1.0) -> complex:
-    """Dominant multiplier of `specimen` on fixed ground, at the frequency of `orbit` and `factor` times its amplitude.
-    It is NaN if no orbit is found.
+def _slopes(specimen: Specimen, orbit: Orbit) -> Array:
+    """Derivatives of modulus and angle [rad] of the dominant multiplier of `specimen` with respect to the logarithm of
+    the amplitude, shape (2,). They are NaN if no orbit is found.
     """
+    more, less = (_moved(specimen, orbit, 1.0 + step) for step in (STEP, -STEP))
+    if more is None or less is None:
+        return np.full(2, nan)
+    # the same pair at both amplitudes, even if two pairs exchange dominance between them
+    same = min((complex(each) for each in less.multipliers), key=lambda each: abs(each - more.slowest))
+    return np.array([abs(more.slowest) - abs(same), phase(more.slowest) - phase(same)]) / (2.0 * STEP)
+
+
+def _slowest(specimen: Specimen, orbit: Orbit) -> complex:
+    """Dominant multiplier of `specimen` on fixed ground with the drive of `orbit`; NaN if no orbit is found."""
+    found = _moved(specimen, orbit)
+    return complex(nan, nan) if found is None else found.slowest
+
+
+def _moved(specimen: Specimen, orbit: Orbit, factor: float = 1.0) -> Orbit | None:
+    """Orbit of `specimen` on fixed ground, near `orbit`, at `factor` times its amplitude; None if there is none."""
     try:
-        return rocking_orbit(specimen, orbit.omega, factor * orbit.amplitude, guess=orbit).slowest
+        return rocking_orbit(specimen, orbit.omega, factor * orbit.amplitude, guess=orbit)
     except NoOrbit:
-        return complex(nan, nan)
+        return None
 
 
 @dataclass(frozen=True)

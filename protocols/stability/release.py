@@ -1,8 +1,8 @@
 """Release of a held motion: a deflection along the dominant pair of multipliers, and the free cycles after it."""
 
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass
-from math import hypot
+from math import hypot, isnan
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,9 +23,9 @@ DEFLECTION = 8
 have states are required to leave the other multipliers unexcited; a larger number permits smaller controls.
 """
 
-START, LEAST = 0.7, 0.02
-"""START: largest deviation at the release, relative to `BOUND`, for an orbit predicted to be stable. LEAST: smallest
-deviation, relative to the orbit, for an unstable one, whose deviation then grows.
+START, LEAST = 0.35, 0.02
+"""START: largest deviation at the release, relative to `BOUND`, for an orbit predicted to be stable; it may grow all
+the same. LEAST: smallest deviation, relative to the orbit, for an unstable one, whose deviation then grows.
 """
 
 LOST = 2.0
@@ -93,16 +93,22 @@ def release(
     return Released(np.array(rows).reshape(-1, orbit.size), orbit)
 
 
-def parts_of(found: Multiplier, amplitude_slope: float, table_scale: float) -> dict[str, float]:
-    """Standard uncertainties of the modulus by contribution, largest first: scatter of the cycles, and amplitude of the
-    table with the relative standard uncertainty `table_scale`. The second is 0 for an unknown `amplitude_slope` (NaN).
+def parts_of(found: Multiplier, slopes: Sequence[float], table_scale: float) -> dict[str, float]:
+    """Standard uncertainties of the modulus by contribution, largest first: scatter of the cycles, pairs of multipliers
+    that are not fitted, and amplitude of the table with the relative standard uncertainty `table_scale`. The `slopes`
+    are d|mu|/d ln A and its standard uncertainty; NaN for an unknown one, which does not contribute.
     """
-    slope = 0.0 if amplitude_slope != amplitude_slope else abs(amplitude_slope)
     parts = {
         "scatter of the cycles": found.modulus_uncertainty,
-        "amplitude of the table": slope * table_scale,
+        "pairs that are not fitted": found.modulus_other,
+        "amplitude of the table": known_norm(slopes) * table_scale,
     }
     return dict(sorted(parts.items(), key=lambda part: -part[1]))
+
+
+def known_norm(values: Sequence[float]) -> float:
+    """Square root of the sum of squares of the known `values`, which are not NaN."""
+    return hypot(*(value for value in values if not isnan(value)))
 
 
 def combined(parts: dict[str, float]) -> float:

@@ -38,8 +38,10 @@ SCALE = 0.005
 """Standard deviation of the relative error of the accelerometer's scale."""
 
 
-def measured(options: list[str], beta: float, seed: int, share: float) -> tuple[list[dict[str, Any]], Specimen]:
-    """Points of one run, and the true specimen."""
+def measured(
+    options: list[str], beta: float, seed: int, share: float
+) -> tuple[list[dict[str, Any]], Specimen] | Omitted:
+    """Points of one run, and the true specimen; the reason of a run that did not end as planned."""
     specimen, factor = drawn(share, seed)
     error = SCALE * float(np.random.default_rng(10_000 + seed).standard_normal())
     with tempfile.TemporaryDirectory() as folder:
@@ -50,7 +52,7 @@ def measured(options: list[str], beta: float, seed: int, share: float) -> tuple[
         with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()) as told:
             status = main([*command, "--beta", str(beta), *options])
         if status != 0:
-            raise SystemExit(told.getvalue()[-800:])
+            return Omitted(told.getvalue().strip().rpartition("\n")[2])
         points = json.loads(Path(f"{folder}/run/summary.json").read_text(encoding="utf-8"))["points"]
     # a spring that is not the nominal one: beta of the true k_c over the true k1
     true = specimen.coupled(beta * factor * BenchConfiguration().specimen.frame.k1 / specimen.frame.k1)
@@ -88,7 +90,10 @@ class Released:
 
 def released(omega: float, beta: float, seed: int, share: float, options: list[str]) -> Released | Omitted:
     """The point of one run without bisection."""
-    (point,), specimen = measured(["--omega", str(omega), "--no-bisect", *options], beta, seed, share)
+    run = measured(["--omega", str(omega), "--no-bisect", *options], beta, seed, share)
+    if isinstance(run, Omitted):
+        return run
+    (point,), specimen = run
     if point["modulus"] is None:
         return Omitted(f"{point['status']}: {point['reason']}")
     pairs = multipliers(specimen, omega, point["amplitude_m_s2"])
@@ -140,7 +145,11 @@ def of_boundaries(asked: argparse.Namespace) -> None:
     inside, close, found = 0, 0, 0
     for seed in range(asked.first, asked.first + asked.seeds):
         options = ["--omega", str(low), str(high), *asked.options]
-        rows, specimen = measured(options, beta, seed, asked.share)
+        run = measured(options, beta, seed, asked.share)
+        if isinstance(run, Omitted):
+            print(f"boundary, seed {seed}: {run.reason}", flush=True)
+            continue
+        rows, specimen = run
         points = [StabilityPoint.model_validate(row) for row in rows]
         boundary = next(iter(measured_boundaries(points)), None)
         if boundary is None:

@@ -142,6 +142,22 @@ def test_a_second_pair_is_separated_from_the_dominant_one() -> None:
     assert found.modulus == pytest.approx(1.01, abs=max(2e-4, 3.0 * found.modulus_uncertainty))
 
 
+def test_a_pair_that_is_not_fitted_is_a_part_of_the_uncertainty() -> None:
+    """Two similar pairs and one that decays soon. At least 12 of 16 are covered with a probability of 0.999; noise
+    alone covers half of them, so that 12 would have one of 0.04.
+    """
+    first, second, third = 0.998 * np.exp(2.723j), 0.967 * np.exp(2.724j), 0.76 * np.exp(2.53j)
+    inside = np.zeros(2)
+    for seed in range(16):
+        decaying = spiral(third, 60, 0.015, 0.0, 100 + seed)
+        found = dominant_multiplier(spiral(first, 60, 0.05, 1e-4, seed, second) + decaying - decaying[-1])
+        assert found is not None
+        assert found.pairs == 2
+        error, noise = abs(found.modulus - abs(first)), found.modulus_uncertainty
+        inside += error <= 2.0 * np.array([noise, np.hypot(noise, found.modulus_other)])
+    assert inside[0] < 12 <= inside[1]
+
+
 def test_noise_alone_has_no_multiplier() -> None:
     rng = np.random.default_rng(5)
     assert not any(dominant_multiplier(1.0 + 1e-3 * rng.standard_normal((60, 12))) for _ in range(8))

@@ -1,6 +1,7 @@
 """Boundaries from points and curves, predicted multipliers, and the deflection before a release."""
 
 from collections.abc import Generator
+from math import hypot
 
 import numpy as np
 import pytest
@@ -23,7 +24,7 @@ from sim.cycle_map import cycle_map
 from sim.errors import InvalidInput
 from sim.knowledge import SpecimenKnowledge
 from sim.specimen import Specimen
-from sim.steady import Orbit
+from sim.steady import Orbit, rocking_orbit
 from tests.protocols.harmonic.scripted import cycle
 
 AMPLITUDE = 1.01 * Specimen().uplift_acceleration
@@ -92,8 +93,17 @@ def test_the_sensitivity_to_the_amplitude_and_the_uncertainty_of_a_prediction() 
     assert more is not None
     assert less is not None
     assert found.slope == pytest.approx((more.multiplier - less.multiplier) / 0.01, rel=0.02)
+    assert found.slope_spread == found.turn_spread == 0.0
     damping = exact.model_copy(update={"damping": 0.3})
-    assert 0.0 < predicted(orbit(), damping, None, 1).uncertainty < 0.1
+    uncertain = predicted(orbit(), damping, None, 1)
+    assert 0.0 < uncertain.uncertainty < 0.1
+    slopes = [
+        [predicted(rocking_orbit(each, 15.0, AMPLITUDE, guess=orbit()), exact, None, 1) for each in pair]
+        for pair in damping.deviations(orbit().specimen)
+    ]
+    for name in ("slope", "turn"):
+        parts = [0.5 * (getattr(more, name) - getattr(less, name)) for more, less in slopes]
+        assert getattr(uncertain, f"{name}_spread") == pytest.approx(hypot(*parts), rel=1e-4)
 
 
 @pytest.mark.parametrize(("omega", "beta"), [(15.0, 0.97), (16.0, 0.4)])
