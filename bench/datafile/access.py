@@ -50,16 +50,25 @@ def open_living(path: Path) -> Any:
     return _opened(path, h5f.ACC_RDONLY | h5f.ACC_SWMR_READ)
 
 
+CHUNK_CACHE, CHUNK_SLOTS = 2**17, 127
+"""Memory in which HDF5 keeps chunks of each dataset of a file being written [bytes], and number of their places.
+
+Only the last, incomplete chunk is needed again. HDF5's default is 8 MB for each dataset, which a long run fills.
+"""
+
+
 def open_to_write(path: Path) -> Any:
     """Open a new file, which its creator has closed, in single-writer mode to append to its datasets.
 
     Switching an open file to this mode instead would leave HDF5's default number of attempts in effect.
     """
-    return _opened(path, h5f.ACC_RDWR | h5f.ACC_SWMR_WRITE)
+    return _opened(path, h5f.ACC_RDWR | h5f.ACC_SWMR_WRITE, CHUNK_CACHE)
 
 
-def _opened(path: Path, mode: int) -> Any:
+def _opened(path: Path, mode: int, cache: int | None = None) -> Any:
     made = h5p.create(h5p.FILE_ACCESS)
+    if cache is not None:
+        made.set_cache(0, CHUNK_SLOTS, cache, 1.0)
     made.set_libver_bounds(h5f.LIBVER_V110, h5f.LIBVER_V110)
     made.set_alignment(1, 1)
     made.set_file_locking(False, ignore_when_disabled=True)

@@ -111,3 +111,11 @@ def test_they_are_recovered(tmp_path: Path) -> None:
     assert recover(path, target).loss == ""
     with open_datafile(path) as before, open_datafile(target) as after:
         np.testing.assert_array_equal(before.resampled("laser_1", 1), after.resampled("laser_1", 1))
+
+
+def test_chunks_kept_in_memory_are_few(tmp_path: Path) -> None:
+    """HDF5 keeps so much of each dataset until the file is closed: by default 8 MB of each, a gigabyte in all."""
+    recorder = begin(tmp_path / "campaign.h5", channels=[LASER])
+    kept = [each._stored.id.get_access_plist().get_chunk_cache()[1] for each in recorder._writer._parts.grown]  # pyright: ignore
+    recorder.close("completed")
+    assert sum(kept) < 30e6
