@@ -5,6 +5,8 @@
     python -m tests.benchmarks.audit --anew NAMES                                      # discards what is stored first
     python -m tests.benchmarks.audit --benches 0 --write                               # the table from what is stored
 
+The rows of studies of which nothing is stored stay as they are.
+
 `NAMES` are studies or beginnings of their names, such as `frame` or "alpha_2, default". The benches are carried out in
 rounds of `ROUND` of each study, those with little cost first, and are stored in a JSON file (`--results`) every few
 seconds, so that an interrupted audit is resumed. After a change of an estimate or its budget, use `--anew`.
@@ -123,17 +125,20 @@ HEADING = (
 )
 
 
-def table(asked: Iterable[Study], results: Stored) -> list[str]:
-    """Lines of the table for the studies of which benches are stored."""
+def table(asked: Iterable[Study], results: Stored, before: Sequence[str] = ()) -> list[str]:
+    """Lines of the table for the studies of which benches are stored; of the others, those of the table `before`."""
     lines = list(HEADING)
     for study in asked:
         outcomes = list(results.get(study.name, {}).values())
         measured = [one for one in outcomes if not isinstance(one, Omitted)]
         omitted = len(outcomes) - len(measured)
         for key, symbol in study.quantities.items():
+            begin = f"| {symbol} | {study.case} | "
             if len(measured) > 1:
                 found = Statistics.of([one[key] for one in measured])
-                lines.append(f"| {symbol} | {study.case} | {_row(study, key, found, omitted)} |")
+                lines.append(f"{begin}{_row(study, key, found, omitted)} |")
+            elif not outcomes:
+                lines += [line for line in before if line.startswith(begin)]
     return lines
 
 
@@ -188,7 +193,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     extend(chosen, results, asked.results, asked.benches, asked.processes)
     if asked.write:
         page = PAGE.read_text(encoding="utf-8")
-        PAGE.write_text(with_table(page, table(studies().values(), results)), encoding="utf-8", newline="\n")
+        lines = table(studies().values(), results, page.splitlines())
+        PAGE.write_text(with_table(page, lines), encoding="utf-8", newline="\n")
     else:
         print("\n".join(table(chosen, results)))
 
