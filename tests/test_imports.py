@@ -36,3 +36,15 @@ def imported() -> dict[str, set[str]]:
 def test_an_import_loads_nothing_that_only_a_later_stage_needs(modules: str, imported: dict[str, set[str]]) -> None:
     assert modules.partition(".")[0].partition(",")[0] in imported[modules]
     assert not STAGES[modules] & imported[modules]
+
+
+def test_the_kernel_is_loaded_without_linear_algebra_which_numba_still_finds_when_needed() -> None:
+    code = (
+        "import sys, sim.kernel.steps\n"
+        "assert 'numba' in sys.modules and 'scipy.linalg' not in sys.modules\n"
+        "import numba, numpy as np\n"
+        "product = numba.njit(lambda x: (x @ x, np.cov(x)))\n"
+        "x = np.array([[1.0, 2.0], [3.0, 5.0]])\n"
+        "assert np.array_equal(product(x)[0], x @ x) and np.allclose(product(x)[1], np.cov(x))\n"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)

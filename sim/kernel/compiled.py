@@ -10,6 +10,7 @@ The wrapper for calls from C is omitted, because it is unused and slow to compil
 # pyright: reportPrivateImportUsage=false, reportAttributeAccessIssue=false
 # numba has no type annotations; `cast` below restores the type of the decorated function.
 
+import importlib
 import threading
 from collections.abc import Callable
 from pathlib import Path
@@ -17,12 +18,30 @@ from typing import Any, TypeVar, cast
 
 import llvmlite.binding
 import numba
+import numba.np.linalg
 import numpy as np
 from numba.extending import register_jitable
 
 from sim.kernel.cache import KERNEL, KernelCache
 
 F = TypeVar("F", bound=Callable[..., Any])
+
+
+def _load_array_functions() -> None:
+    """Import numba's array functions without scipy.linalg, an eighth of the processor time of a short command.
+
+    numba imports it only to check for a BLAS, once here and again when a compiled function calls one.
+    """
+    check = numba.np.linalg.ensure_blas
+    numba.np.linalg.ensure_blas = lambda: None
+    try:
+        functions = importlib.import_module("numba.np.arraymath")
+    finally:
+        numba.np.linalg.ensure_blas = check
+    functions.ensure_blas = check
+
+
+_load_array_functions()
 
 OPTIONS = ("OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "BOUNDSCHECK", "DEBUGINFO_DEFAULT", "DISABLE_INTEL_SVML")
 """numba's settings that change the compiled code but, unlike the processor, are not part of its cache key."""
