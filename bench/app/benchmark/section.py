@@ -71,13 +71,14 @@ class Column:
 @dataclass(frozen=True)
 class Target:
     """A performance target, met when `measured` is at most `limit`; `measured` is None when it could not be
-    measured.
+    measured. `bound` states what limits a target that may be missed.
     """
 
     name: str
     limit: float
     measured: float | None
     unit: str
+    bound: str = ""
 
     @property
     def met(self) -> bool | None:
@@ -140,11 +141,16 @@ TARGET_COLUMNS = (
 
 
 def targets_section(sections: Sequence[Section]) -> Section:
-    """All targets in one table, missed targets first."""
+    """All targets in one table, missed targets first, with what limits them."""
     targets = [target for section in sections for target in section.targets]
     order = {False: 0, None: 1, True: 2}
     rows = [target.row() for target in sorted(targets, key=lambda target: order[target.met])]
-    return Section("targets", "Targets", TARGET_COLUMNS, rows)
+    notes = [
+        f"Missed: {target.name}. {target.bound or 'The cause is not known.'}"
+        for target in targets
+        if target.met is False
+    ]
+    return Section("targets", "Targets", TARGET_COLUMNS, rows, notes)
 
 
 def _shown(value: Cell, form: str) -> str:

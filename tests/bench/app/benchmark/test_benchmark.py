@@ -98,11 +98,13 @@ def test_contenders_run_in_turn() -> None:
 
 
 def test_missed_targets_come_first() -> None:
-    targets = (Target("kept", 1.0, 0.5, "s"), Target("unknown", 1.0, None, "s"), Target("missed", 1.0, 2.0, "s"))
+    missed = Target("missed", 1.0, 2.0, "s", "The disk is slow.")
+    targets = (Target("kept", 1.0, 0.5, "s", "Nothing."), Target("unknown", 1.0, None, "s"), missed)
     section = targets_section([Section("x", "X", (), (), targets=targets)])
     assert [row["name"] for row in section.rows] == ["missed", "unknown", "kept"]
     assert [row["met"] for row in section.rows] == [False, None, True]
     assert "NO" in section.text().splitlines()[4]
+    assert section.notes == ["Missed: missed. The disk is slow."]
 
 
 def test_a_table_is_aligned_in_text_and_ruled_in_markdown() -> None:

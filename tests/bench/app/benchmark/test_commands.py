@@ -10,8 +10,10 @@ from sim.errors import RockbenchError
 
 
 def test_a_command_is_measured_and_compared_with_its_limits(monkeypatch: pytest.MonkeyPatch) -> None:
-    # on Linux the peak of a child begins with the memory of the process that starts it: here that of all tests so far
-    chosen = (Waited("--version", 60.0, "processor_s", memory=1e5, quick=True), Waited("paper --pdf x.pdf", 1.0))
+    # much less than the memory of this process
+    kept = bytearray(500_000_000)
+    kept[::4096] = b"x" * len(kept[::4096])
+    chosen = (Waited("--version", 60.0, "processor_s", memory=200.0, quick=True), Waited("paper --pdf x.pdf", 1.0))
     monkeypatch.setattr(part, "COMMANDS", chosen)
     section = commands(quick=True)
     (row,) = section.rows
