@@ -23,6 +23,10 @@ HELD, PAUSE = 1.0, 0.05
 rename it [s].
 """
 
+LLVM = "llvmlite.binding.executionengine"
+CALLED_BY_LLVM = ("_raw_object_cache_notify", "_raw_object_cache_getbuffer")
+"""Functions of llvmlite, in the module `LLVM`, that native code calls to store and load compiled code."""
+
 _paths: set[Path] = set()
 _reserved: set[Path] = set()
 _names: dict[Path, Path] = {}
@@ -30,16 +34,25 @@ _names: dict[Path, Path] = {}
 _broken_off: list[FrameType] = []
 
 
-def keep_broken_off(frame: FrameType | None) -> None:
-    """Keep all objects of the computation that the caller, a signal handler, is about to break off in `frame`.
+def break_off(frame: FrameType | None, error: Callable[[], BaseException]) -> None:
+    """For a signal handler called in `frame`: raise `error()`, and keep all objects of the computation.
 
     The exception may be raised while a library hands over native memory: llvmlite links two compiled modules in native
     code and marks the second one as consumed in the next statement. A destructor called between the two frees that
     memory twice, which ends the process with a segmentation fault.
+
+    Returns without an exception while native code waits for the answer of a Python function: ctypes would only report
+    the exception, and LLVM would take the missing answer for a module without code, whose functions have the address 0.
     """
     if frame is not None:
+        caller: FrameType | None = frame
+        while caller is not None:
+            if caller.f_code.co_name in CALLED_BY_LLVM and caller.f_globals.get("__name__") == LLVM:
+                return
+            caller = caller.f_back
         # a kept frame keeps its local variables, and its callers
         _broken_off.append(frame)
+    raise error()
 
 
 @contextmanager

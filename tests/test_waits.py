@@ -39,6 +39,7 @@ OWN = "in a process of its own, which its parent ends"
 ASKS = "for a person's answer: the console ends it at Ctrl-C"
 
 LISTED = {
+    "bench/app/benchmark/commands.py time.sleep": SHORT,
     "bench/app/benchmark/scaling.py subprocess.run": CHILD,
     "bench/app/cli/console.py self._changed.wait": THREAD,
     "bench/app/cli/console.py self._closing.wait": THREAD,

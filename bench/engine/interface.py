@@ -8,7 +8,7 @@ from types import FrameType
 from typing import Protocol
 
 from bench.events import Event, PointFinished, Subscriber, Warned
-from bench.unfinished import keep_broken_off
+from bench.unfinished import break_off
 from drivers.clock import Clock
 from drivers.errors import RigError
 from sim.errors import UNKNOWN, Cause, CauseCode, Interruption, RockbenchError
@@ -114,12 +114,11 @@ class Requests:
             self.breaking = before
 
     def break_off(self, frame: FrameType | None) -> None:
-        """For a signal handler called in `frame`: raise the exception of `breakable`, and keep the objects of the
-        computation; outside `breakable`, return.
+        """For a signal handler called in `frame`: raise the exception of `breakable`, where that is safe, and keep the
+        objects of the computation (`bench.unfinished.break_off`); outside `breakable`, return.
         """
         if self.breaking is not None:
-            keep_broken_off(frame)
-            raise self.breaking()
+            break_off(frame, self.breaking)
 
     @contextmanager
     def without_rig(self) -> Generator[None]:

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, NoReturn
 
 from bench.app.cli.closing import watch_console
 from bench.app.cli.output import print_error, report_error
-from bench.unfinished import completed, keep_broken_off, remove_unfinished
+from bench.unfinished import break_off, completed, remove_unfinished
 
 if TYPE_CHECKING:
     from bench.engine.interface import Requests
@@ -48,11 +48,12 @@ class Interrupts:
         return None if self.first is None else 128 + self.first
 
     def __call__(self, number: int, frame: FrameType | None) -> None:
-        """Raise KeyboardInterrupt at the first signal; further ones must not interrupt the clean-up."""
+        """Raise KeyboardInterrupt at the first signal, where an exception is safe; further ones must not interrupt the
+        clean-up.
+        """
         if self.first is None:
             self.first = number
-            keep_broken_off(frame)
-            raise KeyboardInterrupt
+            break_off(frame, KeyboardInterrupt)
 
 
 class Leaving(Interrupts):

@@ -3,8 +3,11 @@
 import signal
 import sys
 from collections.abc import Callable, Generator
+from typing import Any, cast
 
+import numba
 import pytest
+from numba.core.registry import cpu_target
 
 from bench import unfinished
 from bench.app.cli.interrupt import Interrupts, interruptible
@@ -26,14 +29,17 @@ class Module:
 
 @pytest.fixture(autouse=True)
 def handlers() -> Generator[None]:
-    """Restores the handlers, and frees what the test has kept."""
+    """Restores the handlers, and frees what was kept."""
     before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     Module.freed = 0
     yield
     for number, handler in before.items():
         signal.signal(number, handler)
+    _free()
+
+
+def _free() -> None:
     unfinished._broken_off.clear()  # pyright: ignore[reportPrivateUsage]
-    assert Module.freed == 2
 
 
 def _command() -> None:
@@ -75,3 +81,21 @@ def test_the_objects_are_kept_until_the_process_ends(computation: Callable[[], N
         interrupted = True
     assert interrupted
     assert Module.freed == 0
+    _free()
+    assert Module.freed == 2
+
+
+@pytest.mark.parametrize("asked", ["_object_cache_getbuffer", "_object_cache_notify"])
+def test_the_code_that_llvm_asks_for_is_still_handed_over(asked: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Otherwise a kernel would be loaded without its functions, and the process would end by a segmentation fault."""
+    engine = cast(Any, cpu_target).target_context.codegen()._engine._ee
+    answer, interrupts = getattr(engine, asked), Interrupts()
+
+    def interrupted(*arguments: Any) -> Any:
+        signal.raise_signal(signal.SIGINT)
+        return answer(*arguments)
+
+    monkeypatch.setattr(engine, asked, interrupted)
+    signal.signal(signal.SIGINT, interrupts)
+    assert cast(Any, numba).njit(lambda x: 2.0 * x)(3.0) == 6.0  # pyright: ignore[reportUnknownLambdaType]
+    assert interrupts.first == signal.SIGINT
