@@ -124,7 +124,8 @@ def watched(command: Sequence[str], path: Path, hours: float) -> int:
     with subprocess.Popen(command, stdout=subprocess.DEVNULL) as run:
         eventually(lambda: run.poll() is not None or path.exists())
         while run.poll() is None and due <= hours + 1e-9:
-            time.sleep(1.0)
+            # seldom, because opening a growing file costs the processor time of half a second of a run
+            time.sleep(max(1.0, 3.6 * hours))
             with contextlib.suppress(Exception), open_datafile(path) as record:
                 done = record.rows / record.sample_rate / 3600.0
                 if done < due:
