@@ -15,7 +15,8 @@ import h5py
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from bench.datafile.access import VERSIONS, Quiet, is_let_go, locking, open_living, open_to_write
+from bench.datafile.access import VERSIONS, Quiet, is_let_go, locking, open_living
+from bench.datafile.access import open_to_write as open_to_write
 from bench.datafile.hdf5_creation import GZIP_LEVEL, create_fixed, create_growing
 from bench.datafile.hdf5_creation import copy_member as copy_member
 from bench.datafile.hdf5_creation import describe as describe
@@ -54,13 +55,6 @@ def create(path: Path) -> File:
     # metadata are allocated in small pages, so that no object header crosses the border of a disk sector, where a power
     # failure could leave it half written (measured in docs/decisions, no. 10)
     return cast(File, h5py.File(path, "x", libver=VERSIONS, locking=False, fs_strategy="page", fs_page_size=PAGE))
-
-
-def reopen_to_write(file: File) -> File:
-    """Close a new file and open it in single-writer mode, in which its datasets can be read while they grow."""
-    path = Path(file.filename)
-    file.close()
-    return cast(File, open_to_write(path))
 
 
 def release(file: File) -> None:

@@ -29,6 +29,7 @@ from bench.datafile.layout import (
 from bench.datafile.samples import Timeline
 from bench.events import Event, PointFinished
 from bench.findings import FitFinished, SpecimenIdentified
+from bench.unfinished import replace, unfinished
 from drivers.rig import Counts, RawValues
 from sim.errors import InvalidInput
 
@@ -98,6 +99,18 @@ def _check_folder(folder: Path) -> None:
         room.write(bytes(ROOM))
 
 
+def _rename_new(temporary: Path, path: Path) -> None:
+    """Rename a complete file. Raises InvalidInput if `path` exists."""
+    try:
+        # unlike a rename, a link never replaces a file that another program has created meanwhile
+        os.link(temporary, path)
+    except FileExistsError:
+        raise InvalidInput("record", str(path), _EXISTS) from None
+    except OSError:
+        # not every file system has links
+        replace(temporary, path)
+
+
 class DataFileWriter:
     """Writer of a new file and its journal.
 
@@ -112,20 +125,26 @@ class DataFileWriter:
         for taken in (path, journal_path(path)):
             if taken.exists():
                 raise InvalidInput("record", str(taken), _EXISTS)
+        # a program that looks for files in the folder finds a complete one, even if this process is killed here
+        with unfinished(path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")) as temporary:
+            try:
+                _check_folder(path.parent)
+                self._file = hdf5.create(temporary)
+            except OSError as error:
+                raise InvalidInput(
+                    "record",
+                    str(path),
+                    f"the file cannot be created ({error.strerror or reason(error)}); choose another folder",
+                ) from error
+            try:
+                parts = build(self._file, skeleton)
+                self._file.close()
+                _rename_new(temporary, path)
+            except (OSError, RuntimeError) as error:
+                hdf5.release(self._file)
+                raise DataFileError(f"{path} could not be created ({reason(error)}): check the disk") from error
         try:
-            _check_folder(path.parent)
-            self._file = hdf5.create(path)
-        except FileExistsError:
-            raise InvalidInput("record", str(path), _EXISTS) from None
-        except OSError as error:
-            raise InvalidInput(
-                "record",
-                str(path),
-                f"the file cannot be created ({error.strerror or reason(error)}); choose another folder",
-            ) from error
-        try:
-            parts = build(self._file, skeleton)
-            self._file = hdf5.reopen_to_write(self._file)
+            self._file = hdf5.open_to_write(path)
             self._parts = parts.reopened(self._file)
             self._file.flush()
             self._journal = JournalWriter(journal_path(path))

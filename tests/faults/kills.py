@@ -83,7 +83,7 @@ def kill(protocol: str, moment: float, seed: int, folder: Path) -> Kill | None:
 
 
 def _created(run: "subprocess.Popen[bytes]", out: Path, folder: Path) -> Path:
-    """The data file of a run, as soon as it has samples."""
+    """The data file of a run, as soon as it can be read."""
     end = time.monotonic() + PATIENCE
     while time.monotonic() < end and run.poll() is None:
         for path in out.glob("*.h5"):

@@ -8,17 +8,18 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from bench.datafile import hdf5
+from bench.datafile import hdf5, writer
 from bench.datafile.access import locking
 from bench.datafile.hdf5_reading import DataFileError
 from bench.datafile.inspection import overview, verify
 from bench.datafile.reader import open_datafile
 from bench.datafile.recorder import Recorder
 from bench.datafile.recovery import recover
-from sim.errors import RockbenchError
+from sim.errors import InvalidInput, RockbenchError
 from tests.bench.datafile.living import begin, hand_over
 from tests.patience import LONG
 
@@ -192,6 +193,54 @@ def test_a_reader_that_locks_the_file_while_it_is_created_does_not_end_the_recor
     file = hdf5.create(path)
     with path.open("rb") as reader:
         fcntl.flock(reader, fcntl.LOCK_SH | fcntl.LOCK_NB)
-        file = hdf5.reopen_to_write(file)
+        file.close()
+        file = hdf5.open_to_write(path)
         file.flush()
     file.close()
+
+
+@pytest.fixture
+def meanwhile(monkeypatch: pytest.MonkeyPatch) -> list[Callable[[], object]]:
+    """What another program does while a file is created."""
+    steps, build = list[Callable[[], object]](), writer.build
+
+    def interrupted(*arguments: Any) -> Any:
+        for step in steps:
+            step()
+        return build(*arguments)
+
+    monkeypatch.setattr(writer, "build", interrupted)
+    return steps
+
+
+def test_a_file_has_its_name_only_when_it_can_be_read(tmp_path: Path, meanwhile: list[Callable[[], object]]) -> None:
+    path, found = tmp_path / "run.h5", list[bool]()
+    meanwhile.append(lambda: found.append(path.exists()))
+    recorder = begin(path)
+    assert found == [False]
+    with open_datafile(path) as record:
+        assert record.rows == 0
+    recorder.close("completed")
+    assert {each.name for each in tmp_path.iterdir()} == {"run.h5", "run.events.jsonl"}
+
+
+def test_a_file_that_another_program_creates_meanwhile_is_kept(
+    tmp_path: Path, meanwhile: list[Callable[[], object]]
+) -> None:
+    path = tmp_path / "run.h5"
+    meanwhile.append(lambda: path.write_bytes(b"theirs"))
+    with pytest.raises(InvalidInput, match="never overwritten"):
+        begin(path)
+    assert path.read_bytes() == b"theirs"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_file_can_be_created_where_there_are_no_links(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(*_: Any) -> None:
+        raise OSError(errno.EPERM, os.strerror(errno.EPERM))
+
+    monkeypatch.setattr(os, "link", refused)
+    path = tmp_path / "run.h5"
+    begin(path).close("completed")
+    assert verify(path).problems == ()
+    assert {each.name for each in tmp_path.iterdir()} == {"run.h5", "run.events.jsonl"}
