@@ -146,6 +146,11 @@ def reserve(folder: Path) -> None:
     _reserved.add(folder)
 
 
+def remove_at_interrupt(path: Path) -> None:
+    """Register a file or folder that a library removes at a normal end of the process only."""
+    _paths.add(path)
+
+
 def remove_unfinished() -> None:
     """Remove all unfinished files and folders; called from any thread just before the process exits."""
     for path in tuple(_paths):

@@ -221,7 +221,8 @@ class Bed:
                 end,
                 lateness.worst,
                 process.returncode,
-                driving=driving or any("ramped" in text for _, text in lines),
+                # a rig that is opened in this very moment has no file yet
+                driving=driving or any("ramped" in text or "ending the run" in text for _, text in lines),
             )
             _judge(reaction, lines, process.pid, work, temporary)
         return reaction

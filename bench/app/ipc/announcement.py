@@ -9,12 +9,12 @@ from collections.abc import Generator
 from contextlib import contextmanager, suppress
 from dataclasses import asdict
 from multiprocessing import AuthenticationError
-from multiprocessing.connection import Client, Connection, Listener, answer_challenge, deliver_challenge
+from multiprocessing.connection import Client, Connection, answer_challenge, deliver_challenge
 from typing import cast
 
 from bench.app.ipc.messages import PATIENCE, Attached, Published, Run
 from bench.app.ipc.server import SessionServer
-from bench.app.ipc.sessions import RunningSession, lock_of, remove, sessions_folder
+from bench.app.ipc.sessions import RunningSession, lock_of, open_listener, remove, sessions_folder
 from bench.events import Warned
 from sim import waiting
 
@@ -34,7 +34,7 @@ def announced(server: SessionServer, run: Run, owner: str) -> Generator[None]:
     lock = None
     try:
         lock = lock_of(path)
-        listener = Listener()
+        listener = open_listener()
         session = RunningSession(
             os.getpid(),
             str(listener.address),

@@ -10,7 +10,7 @@ from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from multiprocessing import AuthenticationError
-from multiprocessing.connection import Client, Connection, Listener
+from multiprocessing.connection import Client, Connection
 from pathlib import Path
 from queue import SimpleQueue
 from typing import Literal, cast
@@ -33,7 +33,7 @@ from bench.app.ipc.messages import (
     Traces,
     receive,
 )
-from bench.app.ipc.sessions import RunningSession
+from bench.app.ipc.sessions import RunningSession, open_listener
 from bench.results import SUMMARY
 from drivers.child import OWN_CONSOLE
 from drivers.clock import now
@@ -173,7 +173,7 @@ class SessionClient(ClientConnection):
         super().__init__(None if self._checks_plan or summary.exists() else assignment.out, on_message)
         self._errors = tempfile.TemporaryFile()  # noqa: SIM115 - closed with the process
         key = secrets.token_bytes(32)
-        self._listener = Listener(authkey=key)
+        self._listener = open_listener(key)
         self.process = subprocess.Popen(
             [sys.executable, "-m", "bench.app.ipc.process"],
             stdin=subprocess.PIPE,

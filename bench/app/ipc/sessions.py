@@ -11,8 +11,10 @@ import sys
 import tempfile
 from contextlib import suppress
 from dataclasses import dataclass
+from multiprocessing.connection import Listener
 from pathlib import Path
 
+from bench.unfinished import remove_at_interrupt
 from sim.process_lock import LockHeld, ProcessLock
 
 FOLDER = "ROCKBENCH_SESSIONS"
@@ -45,6 +47,14 @@ class RunningSession:
         """Short description of the run: protocol, operator and folder."""
         by = f" by {self.operator}" if self.operator else ""
         return f"{self.protocol}{by}, {self.out}"
+
+
+def open_listener(key: bytes | None = None) -> Listener:
+    """Listener at an address of its own, for clients that have the `key`, if given."""
+    listener = Listener(authkey=key)
+    if sys.platform != "win32":
+        remove_at_interrupt(Path(str(listener.address)).parent)
+    return listener
 
 
 def sessions_folder() -> Path | None:
