@@ -36,7 +36,6 @@ from bench.datafile.inspection import verify
 from bench.datafile.reader import open_datafile
 from tests.bench.datafile.living import BLOCK, RATE, begin, hand_over
 from tests.emulated import emulated
-from tests.patience import eventually
 
 POINT = ("run", "harmonic", "--omega", "16", "--beta", "0.4", "--json")
 LONG_POINTS = ("run", "harmonic", "--measured-cycles", "1000", "--yes", "--json")
@@ -122,7 +121,6 @@ def watched(command: Sequence[str], path: Path, hours: float) -> int:
     print(f"{'hours':>6} {'time [s]':>9} {'memory [MB]':>12} {'threads':>8} {'files':>6} {'file [MB]':>10}")
     found, begun, due = list[tuple[float, int, int]](), time.monotonic(), 0.1 * hours
     with subprocess.Popen(command, stdout=subprocess.DEVNULL) as run:
-        eventually(lambda: run.poll() is not None or path.exists())
         while run.poll() is None and due <= hours + 1e-9:
             # seldom, because opening a growing file costs the processor time of half a second of a run
             time.sleep(max(1.0, 3.6 * hours))
