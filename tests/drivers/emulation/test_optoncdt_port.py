@@ -208,7 +208,8 @@ def test_a_reader_that_is_too_slow_loses_values_and_delays_nothing(
     assert np.diff(found[:, 1]).max() > dropped // 12
     # after the gap the values are of the present, not of the time in which nobody read
     assert sensor.host_time_of(int(found[-1, 1])) > begun
-    assert say(port, "OUTPUT NONE") == "OUTPUT NONE ok\r\n"
+    # a value that was read in part may stand in front
+    assert say(port, "OUTPUT NONE").endswith("OUTPUT NONE ok\r\n")
 
 
 def test_a_port_keeps_more_than_a_pseudo_terminal_and_says_how_late_it_was(make: Make, connect: Open) -> None:
@@ -265,6 +266,7 @@ def test_garbage_comes_once(make: Make, connect: Open) -> None:
     assert say(port, "ECHO") == "ECHO ON\r\n"
 
 
+@pytest.mark.milliseconds
 def test_silence_ends_by_itself_and_the_counter_shows_it(make: Make, connect: Open) -> None:
     sensor = make(as_found=STREAMING)
     port = connect(sensor)

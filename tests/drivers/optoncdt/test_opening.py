@@ -29,6 +29,7 @@ def take_all(laser: SerialLaser) -> None:
         laser.take()
 
 
+@pytest.mark.seconds
 def test_a_sensor_that_streams_at_another_baud_rate_is_silenced_before_it_is_set_up() -> None:
     """What it hears at wrong baud rates spoils the first command that it understands."""
     as_found = Settings(output="RS422", rate=4000.0, additional=("COUNTER", "TIMESTAMP"), baud=691_200)
