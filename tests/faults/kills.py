@@ -86,7 +86,8 @@ def _created(run: "subprocess.Popen[bytes]", out: Path, folder: Path) -> Path:
     """The data file of a run, as soon as it can be read."""
     end = time.monotonic() + PATIENCE
     while time.monotonic() < end and run.poll() is None:
-        for path in out.glob("*.h5"):
+        # not the hidden one that is being built
+        for path in out.glob("[!.]*.h5"):
             return path
         time.sleep(0.05)
     raise RuntimeError(f"{' '.join(map(str, run.args))} wrote no file: {(folder / 'errors').read_text()}")
