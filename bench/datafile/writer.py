@@ -102,13 +102,17 @@ def _check_folder(folder: Path) -> None:
 def _rename_new(temporary: Path, path: Path) -> None:
     """Rename a complete file. Raises InvalidInput if `path` exists."""
     try:
-        # unlike a rename, a link never replaces a file that another program has created meanwhile
-        os.link(temporary, path)
+        try:
+            # unlike a rename, a link never replaces a file that another program has created meanwhile
+            os.link(temporary, path)
+        except FileExistsError:
+            raise
+        except OSError:
+            # not every file system has links: only an empty file of this process is replaced
+            os.close(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL))
+            replace(temporary, path)
     except FileExistsError:
         raise InvalidInput("record", str(path), _EXISTS) from None
-    except OSError:
-        # not every file system has links
-        replace(temporary, path)
 
 
 class DataFileWriter:

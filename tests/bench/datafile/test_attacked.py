@@ -224,9 +224,15 @@ def test_a_file_has_its_name_only_when_it_can_be_read(tmp_path: Path, meanwhile:
     assert {each.name for each in tmp_path.iterdir()} == {"run.h5", "run.events.jsonl"}
 
 
+def _no_links(*_: Any) -> None:
+    raise OSError(errno.EPERM, os.strerror(errno.EPERM))
+
+
+@pytest.mark.parametrize("link", [os.link, _no_links])
 def test_a_file_that_another_program_creates_meanwhile_is_kept(
-    tmp_path: Path, meanwhile: list[Callable[[], object]]
+    link: Callable[..., None], tmp_path: Path, meanwhile: list[Callable[[], object]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(os, "link", link)
     path = tmp_path / "run.h5"
     meanwhile.append(lambda: path.write_bytes(b"theirs"))
     with pytest.raises(InvalidInput, match="never overwritten"):
@@ -236,10 +242,7 @@ def test_a_file_that_another_program_creates_meanwhile_is_kept(
 
 
 def test_a_file_can_be_created_where_there_are_no_links(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def refused(*_: Any) -> None:
-        raise OSError(errno.EPERM, os.strerror(errno.EPERM))
-
-    monkeypatch.setattr(os, "link", refused)
+    monkeypatch.setattr(os, "link", _no_links)
     path = tmp_path / "run.h5"
     begin(path).close("completed")
     assert verify(path).problems == ()

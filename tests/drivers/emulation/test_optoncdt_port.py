@@ -208,8 +208,7 @@ def test_a_reader_that_is_too_slow_loses_values_and_delays_nothing(
     assert np.diff(found[:, 1]).max() > dropped // 12
     # after the gap the values are of the present, not of the time in which nobody read
     assert sensor.host_time_of(int(found[-1, 1])) > begun
-    # a value that was read in part may stand in front
-    assert say(port, "OUTPUT NONE").endswith("OUTPUT NONE ok\r\n")
+    assert say(port, "OUTPUT NONE") == "OUTPUT NONE ok\r\n"
 
 
 def test_a_port_keeps_more_than_a_pseudo_terminal_and_says_how_late_it_was(make: Make, connect: Open) -> None:
