@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 from nidaqmx.error_codes import DAQmxErrors
 
+from drivers.emulation.daqmx.analog_output import AnalogOutput
 from drivers.emulation.daqmx.device import DeviceModel
 from drivers.emulation.daqmx.errors import DaqmxFailure, SessionExists, SessionMissing
 from drivers.emulation.daqmx.generation import Instant, OutputTerminal
@@ -134,13 +135,18 @@ class Driver:
         with self.changed:
             for name in {device.name, *device.modules}:
                 part = self.catalogue.device(name)
-                for task in self._tasks.values():
-                    if task.job is not None and part.name in task.job.devices:
-                        self._end(task)
-                        if isinstance(task.job, Watchdog):
-                            task.job.disarm()
-                for output in part.output_names:
-                    self.terminals[output].hold(0.0)
+                tasks = [task for task in self._tasks.values() if task.job and part.name in task.job.devices]
+                # an output goes from what it plays to 0 V at one tick, however long the other tasks take to end
+                with self.instant.next():
+                    for task in tasks:
+                        if isinstance(task.job, AnalogOutput):
+                            self._end(task)
+                    for output in part.output_names:
+                        self.terminals[output].hold(0.0)
+                for task in tasks:
+                    self._end(task)
+                    if isinstance(task.job, Watchdog):
+                        task.job.disarm()
                 self.lines.reset(part.name, part.line_names)
             self._expired.discard(device.name)
 

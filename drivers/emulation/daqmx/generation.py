@@ -89,6 +89,7 @@ class Instant:
 
     def __init__(self, tick: Callable[[], int]) -> None:
         self._tick = tick
+        self._next: int | None = None
         self.lock = threading.RLock()
 
     @property
@@ -98,9 +99,16 @@ class Instant:
 
     @contextmanager
     def next(self) -> Generator[int]:
-        """Context manager that provides the next tick; the plant cannot read this tick before the context ends."""
+        """Context manager that provides the next tick; the plant cannot read this tick before the context ends. A
+        context inside another one has the tick of the outer one.
+        """
         with self.lock:
-            yield self._tick() + 1
+            outer = self._next
+            self._next = tick = self._tick() + 1 if outer is None else outer
+            try:
+                yield tick
+            finally:
+                self._next = outer
 
 
 class OutputTerminal:

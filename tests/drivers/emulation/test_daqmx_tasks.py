@@ -156,6 +156,20 @@ class TestReset:
         other.write(0.0)
         assert len(counts(inputs, 10)) == 10
 
+    def test_an_output_goes_from_what_it_plays_to_zero_at_one_tick(self) -> None:
+        # many ticks pass during a reset
+        with Desk(speed=100.0, drive="Dev1/ao0") as desk:
+            output = desk.output(buffer=400_000)
+            played = 0.01 + staircase(400_000) ** 2
+            write(output, played)
+            output.start()
+            desk.plant.pass_ticks(1000)
+            desk.system.devices["Dev1"].reset_device()
+            desk.plant.pass_ticks(2)
+            volts = np.trim_zeros(desk.plant.played(desk.plant.tick()))
+        assert 1000 <= volts.size < played.size
+        assert (volts == played[: volts.size]).all()
+
     def test_a_reset_of_the_server_leaves_no_task(self, desk: Desk) -> None:
         desk.output()
         stub = session_pb2_grpc.SessionUtilitiesStub(desk.channel)
