@@ -45,11 +45,13 @@ states.
 
 @dataclass(frozen=True, eq=False)
 class Attractor:
-    """Long-term motion: `peaks` of u1 and drift [m] in each of the last `KEPT` cycles, shape (KEPT, 2). `fallen` is the
-    number of cycles before the block fell, in which case `peaks` has no rows; None if it did not fall.
+    """Long-term motion: `peaks` of u1 and drift [m] in each of the last `KEPT` cycles, shape (KEPT, 2), and the largest
+    drift `within` a period that slides over these cycles [m], shape (n,). `fallen` is the number of cycles before the
+    block fell, in which case both are empty; None if it did not fall.
     """
 
     peaks: Array
+    within: Array
     fallen: int | None = None
 
     @property
@@ -76,17 +78,28 @@ def attractor(specimen: Specimen, shaker: Shaker, orbit: TableOrbit, cycles: int
     y[6] *= 1.0 + DISTURBANCE
     commands = period.commands(drive)
     carried, mean = np.array([commands[-1], 0.0]), np.zeros(drive.size, dtype=np.complex128)
-    peaks = np.empty((cycles, 2))
+    peaks, drifts = np.empty((cycles, 2)), np.empty((KEPT, TICKS))
     for cycle in range(cycles):
         mode, samples = period.advance(mode, y, carried, commands)
         if mode == FALLEN:
-            return Attractor(np.empty((0, 2)), cycle)
-        peaks[cycle] = np.abs(samples[:, 2]).max(), np.abs(samples[:, 3] - samples[:, 2]).max()
+            return Attractor(np.empty((0, 2)), np.empty(0), cycle)
+        drift = drifts[cycle % KEPT] = np.abs(samples[:, 3] - samples[:, 2])
+        peaks[cycle] = np.abs(samples[:, 2]).max(), drift.max()
         mean += harmonics_of(samples[:, -1], drive.size) / CONTROLLED
         if (cycle + 1) % CONTROLLED == 0:
             drive = drive + SHARE * (orbit.acceleration - mean) * response
             commands, mean = period.commands(drive), np.zeros(drive.size, dtype=np.complex128)
-    return Attractor(peaks[-KEPT:])
+    last = np.roll(drifts, -cycles, axis=0) if cycles > KEPT else drifts[:cycles]
+    return Attractor(peaks[-KEPT:], largest_within(last.ravel(), TICKS))
+
+
+def largest_within(values: Array, length: int) -> Array:
+    """Largest of the `values`, shape (n,), in each position of a window of `length` values, shape (n - length + 1,)."""
+    from scipy.ndimage import maximum_filter1d
+
+    # the window of a value begins `length` // 2 before it
+    found: Array = maximum_filter1d(values, length, mode="nearest")
+    return found[length // 2 : found.size - (length - 1) // 2]
 
 
 def period_of(peaks: Array) -> int:

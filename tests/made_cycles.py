@@ -3,11 +3,15 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.analysis.cycles import Cycle
+from bench.analysis.cycles import TRACES, Cycle
 
 
 def pure_cycle(index: int, amplitudes: NDArray[np.complex128], noise: float = 0.0, samples: int = 600) -> Cycle:
     """A cycle of pure sines with the complex `amplitudes` of its signals."""
     coefficients = np.stack((np.zeros(amplitudes.size), amplitudes.real, amplitudes.imag))
     peak = np.abs(amplitudes)
-    return Cycle(index, samples, coefficients, amplitudes, peak, peak, np.full(amplitudes.size, noise))
+    traces = np.zeros((0, len(TRACES)), dtype=np.float32)
+    if amplitudes.size > max(TRACES):
+        turns = np.exp(-2j * np.pi * np.arange(samples) / samples)
+        traces = np.real(turns[:, None] * amplitudes[list(TRACES)]).astype(np.float32)
+    return Cycle(index, samples, coefficients, amplitudes, peak, peak, np.full(amplitudes.size, noise), traces)

@@ -12,8 +12,15 @@ from math import ceil, tau
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.analysis.signals import DRIFT, LASER_1, LASER_2
+
 HARMONICS = 10
 """Number of jointly fitted harmonics; the higher harmonics of a rocking frame's drift are below 1e-5 of its peak."""
+
+TRACES = (DRIFT, LASER_1, LASER_2)
+"""Signals whose samples are kept with a cycle."""
+
+_NO_TRACES = np.zeros((0, len(TRACES)), dtype=np.float32)
 
 COMPLETE = 0.98
 """Minimum fraction of valid samples in a cycle: with fewer, a laser that leaves its range at every peak would bias the
@@ -48,7 +55,8 @@ class Cycle:
     `fundamental` holds the complex amplitudes c with signal = Re(c exp(-i phase)); `peak` is the largest magnitude of
     the fitted motion, including its mean; `noise` is the rms of the residual; shape (m,) each. `extreme`, shape (m,),
     is the largest magnitude of the smoothed samples. It replaces `peak` for an unsteady motion, which the fit
-    overshoots because the motion differs between the two ends of the cycle.
+    overshoots because the motion differs between the two ends of the cycle. `traces` [m], shape
+    (samples, 3), are the samples of the drift and of both lasers (no rows if there are no such signals).
     """
 
     index: int
@@ -58,6 +66,7 @@ class Cycle:
     peak: NDArray[np.float64]
     extreme: NDArray[np.float64]
     noise: NDArray[np.float64]
+    traces: NDArray[np.float32]
 
     def harmonics(self, column: int) -> NDArray[np.complex128]:
         """Complex amplitudes z_k of one signal, shape (HARMONICS,): the signal is its mean plus Im(sum of z_k exp(i k
@@ -98,17 +107,18 @@ def fit_cycle(
         peak=_peak(waveform),
         extreme=_extreme(values),
         noise=np.sqrt(np.mean(residual**2, axis=0)),
+        traces=values[:, TRACES].astype(np.float32) if values.shape[1] > max(TRACES) else _NO_TRACES,
     )
 
 
-_SHARE = 16
+SHARE = 16
 """Reciprocal of the fraction of a cycle to which a parabola is fitted. Its vertex is the peak, with averaged noise; the
 relative error of the vertex is 5e-6 for a sine and 3e-3 for a fifth harmonic.
 """
 
 
 @lru_cache(maxsize=8)
-def _parabola(points: int) -> NDArray[np.float64]:
+def parabola(points: int) -> NDArray[np.float64]:
     """Matrix that fits a parabola by least squares to `points` samples at x = -h, ..., h, with h = points // 2; its
     rows give the coefficients of 1, x and x^2.
     """
@@ -119,10 +129,10 @@ def _parabola(points: int) -> NDArray[np.float64]:
 def _extreme(values: NDArray[np.float64]) -> NDArray[np.float64]:
     """Largest magnitude of each column of samples, shape (n, m), smoothed by a parabola around it."""
     magnitude = np.abs(values)
-    half = max(len(values) // (2 * _SHARE), 1)
+    half = max(len(values) // (2 * SHARE), 1)
     top: NDArray[np.intp] = np.argmax(magnitude, axis=0)
     rows = np.arange(-half, half + 1)[:, None] + np.clip(top, half, len(values) - 1 - half)
-    fit: NDArray[np.float64] = _parabola(2 * half + 1) @ magnitude[rows, np.arange(top.size)]
+    fit: NDArray[np.float64] = parabola(2 * half + 1) @ magnitude[rows, np.arange(top.size)]
     level, slope, bend = fit[0], fit[1], fit[2]
     # a vertex beyond the window is clipped to its end
     ends: NDArray[np.float64] = half * np.sign(slope)

@@ -1,8 +1,4 @@
-"""Description of an unsteady motion: peaks of its cycles, period, and rate of approach to a periodic motion.
-
-The peak of a cycle is taken from its samples. A fit of one cycle by harmonics of the drive overshoots the peak, by 10 %
-if the amplitude changes by half within a few cycles, because the motion then differs at the two ends of the cycle.
-"""
+"""Description of an unsteady motion: peaks of its cycles, period, and rate of approach to a periodic motion."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.analysis.cycle_peaks import CyclePeaks, cycle_peaks
 from bench.analysis.cycles import Cycle
 from bench.analysis.gain import SteadyPeak, steady_peak
 from bench.analysis.signals import DRIFT, LASER_1, LASER_2, U1
@@ -64,29 +61,24 @@ class Rate:
 
 @dataclass(frozen=True)
 class FreeMotion:
-    """Smallest, mean and largest peak of the drift per cycle [m], over the last `cycles` cycles. `repeats` is the
-    number of cycles after which the motion repeats, 0 if it does not; `rate` is None if the changes are too few, too
-    noisy or not those of a linear system.
+    """Peaks of the drift per cycle. `repeats` is the number of cycles after which the motion repeats, 0 if it does not;
+    `rate` is None if the changes are too few, too noisy or not those of a linear system.
     """
 
-    least: float
-    mean: float
-    greatest: float
+    peaks: CyclePeaks
     repeats: int
     rate: Rate | None
-    cycles: int
 
 
-def free_motion(cycles: Sequence[Cycle]) -> FreeMotion:
-    """Description of consecutive cycles at a constant drive; peaks and period are those of the last `CYCLES`."""
-    extremes = np.array([cycle.extreme[[U1, DRIFT]] for cycle in cycles[-CYCLES:]])
+def free_motion(cycles: Sequence[Cycle], omega: float) -> FreeMotion:
+    """Description of consecutive cycles at a constant drive of `omega` [rad/s]; peaks and period are those of the last
+    `CYCLES`.
+    """
+    last = cycles[-CYCLES:]
     return FreeMotion(
-        least=float(extremes[:, 1].min()),
-        mean=float(extremes[:, 1].mean()),
-        greatest=float(extremes[:, 1].max()),
-        repeats=period_of(extremes),
-        rate=_rate(np.array([cycle.fundamental[[LASER_1, LASER_2]] for cycle in cycles])),
-        cycles=extremes.shape[0],
+        peaks=cycle_peaks(last, omega),
+        repeats=period_of(np.array([cycle.extreme[[U1, DRIFT]] for cycle in last])),
+        rate=rate_of(cycles),
     )
 
 
@@ -98,18 +90,20 @@ def orbit_peak(cycles: Sequence[Cycle], motion: FreeMotion, omega: float) -> Ste
     The square of the relative deviation is added as a transient with a rectangular distribution. On exact motions of
     the model near their boundaries of stability, with deviations up to 10 %, the error was at most 5.1e-4.
     """
-    deviation, rate = 0.5 * (motion.greatest - motion.least) / motion.mean, motion.rate
-    if rate is None or deviation > SMALL or rate.uncertainty > KNOWN or rate.angle * motion.cycles < TURNS * tau:
+    peaks, rate = motion.peaks, motion.rate
+    deviation = 0.5 * (peaks.greatest.drift - peaks.least.drift) / peaks.mean.drift
+    if rate is None or deviation > SMALL or rate.uncertainty > KNOWN or rate.angle * peaks.mean.cycles < TURNS * tau:
         return None
     return steady_peak(cycles[-CYCLES:], omega, deviation**2)
 
 
-def _rate(amplitudes: NDArray[np.complex128]) -> Rate | None:
+def rate_of(cycles: Sequence[Cycle]) -> Rate | None:
     """Rate from the linear map of changes from cycle to cycle, in the plane of their two largest principal components.
 
     Earlier changes are the instrumental variables of the least-squares problem. Without them, noise of the amplitudes
     would bias the multipliers towards zero; the noise is independent for changes that share no cycle.
     """
+    amplitudes = np.array([cycle.fundamental[[LASER_1, LASER_2]] for cycle in cycles])
     moved = np.diff(np.concatenate((amplitudes.real, amplitudes.imag), axis=1), axis=0)
     size = float(np.sum(moved**2))
     if moved.shape[0] < SHORTEST or size == 0.0:

@@ -1,7 +1,7 @@
 """Gain coefficient from measured cycles, with its uncertainty (GUM, and Monte Carlo method of GUM Supplement 1)."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import hypot, inf, sqrt, tau
 
 import numpy as np
@@ -16,8 +16,8 @@ from bench.analysis.signals import ACCELERATION, DRIFT, LASER_1, LASER_2, U1
 from bench.analysis.uncertainty import COVERAGE as COVERAGE
 from bench.analysis.uncertainty import Budget, combined_freedom
 
-SCATTER = "scatter of the cycles"
-"""Name of the contribution of the scatter to the budgets."""
+SCATTER, NOISE = "scatter of the cycles", "noise of the peaks"
+"""Names of the contributions of the cycles to the budgets."""
 
 DRAWS, SEED = 4000, 1
 """Number of Monte Carlo draws of the sensors' errors; with this number, the expanded uncertainty has a statistical
@@ -54,11 +54,12 @@ the same sign, as do those of all even ones, so they add up.
 class SteadyPeak:
     """The drift over measured cycles.
 
-    `drift` [m] is its peak; `scatter` [m] and `transient` [m] are the standard uncertainties of that peak due to the
-    scatter of the cycles and to a remaining transient. `u1` [m] is the first storey's peak, `amplitude` [m/s2] the
-    amplitude of the table's acceleration and `harmonics` the relative rms of its harmonics. `readings` are the lasers'
-    readings at the peak, `cycles` is the number of cycles, and `checks` holds the harmonics of both lasers' readings in
-    a test of the bare frame. `freedom` is the number of degrees of freedom of the scatter.
+    `drift` [m] is its peak; `scatter` [m], `transient` [m] and `noise` [m] are the standard uncertainties of that peak
+    due to the scatter of the cycles, to a remaining transient, and to the noise of the samples around a peak of single
+    cycles. `u1` [m] is the first storey's peak, `amplitude` [m/s2] the amplitude of the table's acceleration and
+    `harmonics` the relative rms of its harmonics. `readings` are the lasers' readings at the peak, `cycles` is the
+    number of cycles, and `checks` holds the harmonics of both lasers' readings in a test of the bare frame. `freedom`
+    is the number of degrees of freedom of the scatter.
     """
 
     drift: float
@@ -71,6 +72,7 @@ class SteadyPeak:
     cycles: int
     checks: Checks | None = None
     freedom: float = inf
+    noise: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -111,41 +113,21 @@ def steady_peak(
     drift = float(waves.peaks[DRIFT])
     scatter, freedom = _standard_error(waves.there[:, DRIFT])
     transient = hypot(remaining_transient(every.there[:, DRIFT], len(cycles)), residual * drift / sqrt(3.0))
-    readings = _readings(waves, omega, drift, at_rest=False)
-    checks = None if frame is None else _checks(cycles, waves, omega, frame)
-    found = _peak(cycles, waves, readings, scatter, transient, float(waves.peaks[U1]))
-    return replace(found, checks=checks, freedom=freedom)
-
-
-def modulated_peak(cycles: Sequence[Cycle], omega: float) -> SteadyPeak:
-    """Largest peak of all cycles, from their samples (see `bench.analysis.free_motion`); the scatter is the standard
-    deviation of the largest peaks of the four quarters of the cycles.
-    """
-    peaks = np.array([cycle.extreme[DRIFT] for cycle in cycles])
-    quarters = [quarter.max() for quarter in np.array_split(peaks, 4) if quarter.size]
-    scatter = float(np.std(quarters, ddof=1)) if len(quarters) > 1 else float(peaks.max())
-    u1 = float(np.max([cycle.extreme[U1] for cycle in cycles]))
-    waves = mean_waves(cycles)
-    readings = _readings(waves, omega, float(peaks.max()), at_rest=True)
-    return replace(_peak(cycles, waves, readings, scatter, 0.0, u1), freedom=float(max(len(quarters) - 1, 1)))
-
-
-def _peak(
-    cycles: Sequence[Cycle], waves: Waves, readings: PeakReadings, scatter: float, transient: float, u1: float
-) -> SteadyPeak:
     return SteadyPeak(
-        drift=readings.drift,
+        drift=drift,
         scatter=scatter,
         transient=transient,
-        u1=u1,
+        u1=float(waves.peaks[U1]),
         amplitude=mean_amplitude(cycles, ACCELERATION),
         harmonics=float(waves.harmonics[ACCELERATION]),
-        readings=readings,
+        readings=_readings(waves, omega, drift),
         cycles=len(cycles),
+        checks=None if frame is None else _checks(cycles, waves, omega, frame),
+        freedom=freedom,
     )
 
 
-def _readings(waves: Waves, omega: float, drift: float, *, at_rest: bool) -> PeakReadings:
+def _readings(waves: Waves, omega: float, drift: float) -> PeakReadings:
     """Lasers' readings at the peak of the mean cycle."""
     lasers = waves.waveform[:, [LASER_1, LASER_2]].T
     peak = waves.at[DRIFT]
@@ -161,11 +143,11 @@ def _readings(waves: Waves, omega: float, drift: float, *, at_rest: bool) -> Pea
         sign=float(np.sign(waves.waveform[peak, DRIFT])),
         lasers=(float(at[0]), float(at[1])),
         speeds=(float(speeds[0]), float(speeds[1])),
-        zero=np.zeros((2, 1)) if at_rest else lasers[:, ::step],
+        zero=lasers[:, ::step],
         swings=(float(swings[0]), float(swings[1])),
         terms=PEAK_ROUNDINGS,
-        at_rest=at_rest,
-        weights=None if at_rest else (2.0 / angles.size) * np.cos(np.outer(angles, orders)).sum(axis=1),
+        at_rest=False,
+        weights=(2.0 / angles.size) * np.cos(np.outer(angles, orders)).sum(axis=1),
     )
 
 
@@ -237,6 +219,8 @@ def gain(
         "remaining transient": hypot(coupled.transient / coupled.drift, bare.transient / bare.drift),
         "amplitude of the table": abs(amplitude_slope) * sensors.table_scale,
     }
+    if coupled.noise or bare.noise:
+        parts[NOISE] = hypot(coupled.noise / coupled.drift, bare.noise / bare.drift)
     freedom = {SCATTER: combined_freedom(zip(scatter, (coupled.freedom, bare.freedom), strict=True))}
     # a running gain, which has shared draws, omits the correlations
     correlations = {name: _correlation(each) for name, each in errors.items()} if shared is None else {}

@@ -29,6 +29,8 @@ RANGE = (0.025, 0.975)
 
 CYCLES, MEMBERS = 1500, 16
 
+PEAKS = "gain of the largest drift within one period, over all positions of the period"
+
 
 @dataclass(frozen=True, eq=False)
 class LongTerm:
@@ -36,8 +38,9 @@ class LongTerm:
     point.
 
     If the orbit on the table is `stable`, the motion is the orbit. The motion repeats after `repeats` cycles; 0 if it
-    does not repeat, or if the block falls. `gains`, shape (n,), are the gains of the peaks of the last cycles; the
-    array is empty if the block falls, which happens after `fallen` cycles. `low` and `high` enclose the gains of the
+    does not repeat, or if the block falls. `gains`, shape (n,), are the gains of the peaks of the last cycles, and
+    `within`, shape (m,), those of the largest drift within a period that slides over them; both are empty if the block
+    falls, which happens after `fallen` cycles. `low` and `high` enclose the gains of the
     greatest peaks for 95 % of the drawn specimens whose block does not fall, and `falls` is the fraction of specimens
     whose block falls; all three are NaN without drawn specimens, `low` and `high` also if every block falls.
     """
@@ -47,6 +50,7 @@ class LongTerm:
     orbit: float
     stable: bool
     gains: NDArray[np.float64]
+    within: NDArray[np.float64]
     repeats: int
     fallen: int | None = None
     low: float = nan
@@ -54,8 +58,8 @@ class LongTerm:
     falls: float = nan
 
     def gain(self, of: Callable[[NDArray[np.float64]], np.float64]) -> float:
-        """Result of the function `of`, such as `np.mean`, for the gains; NaN if the block falls."""
-        return float(of(self.gains)) if self.gains.size else nan
+        """Result of the function `of`, such as `np.mean`, for the gains `within` a period; NaN if the block falls."""
+        return float(of(self.within)) if self.within.size else nan
 
 
 def long_term(
@@ -76,18 +80,22 @@ def long_term(
     fixed = branch.orbit
     orbit, beta = table_orbit(fixed, shaker, harmonics), fixed.specimen.label or 0.0
     if orbit.stable:
-        return LongTerm(fixed.omega, beta, branch.alpha_2, True, np.array([branch.alpha_2]), 1)
+        gain = np.array([branch.alpha_2])
+        return LongTerm(fixed.omega, beta, branch.alpha_2, True, gain, gain, 1)
 
-    def gains(specimen: Specimen) -> tuple[NDArray[np.float64], Attractor]:
-        found = attractor(specimen, shaker, orbit, cycles)
-        return found.peaks[:, 1] / steady_peaks(specimen.bare(), fixed.omega, fixed.amplitude).drift, found
+    def motions(specimen: Specimen) -> tuple[float, Attractor]:
+        bare = steady_peaks(specimen.bare(), fixed.omega, fixed.amplitude).drift
+        return bare, attractor(specimen, shaker, orbit, cycles)
 
     drawn = known.draws(fixed.specimen, members, np.random.default_rng(SEED))
-    (own, motion), *others = in_threads(gains, [fixed.specimen, *drawn])
-    greatest = [float(each.max()) for each, other in others if other.fallen is None]
+    (bare, motion), *others = in_threads(motions, [fixed.specimen, *drawn])
+    own, within = motion.peaks[:, 1] / bare, motion.within / bare
+    greatest = [float(other.within.max()) / each for each, other in others if other.fallen is None]
     low, high = np.quantile(greatest, RANGE).tolist() if greatest else (nan, nan)
     falls = 1.0 - len(greatest) / len(others) if others else nan
-    return LongTerm(fixed.omega, beta, branch.alpha_2, False, own, motion.repeats, motion.fallen, low, high, falls)
+    return LongTerm(
+        fixed.omega, beta, branch.alpha_2, False, own, within, motion.repeats, motion.fallen, low, high, falls
+    )
 
 
 def long_terms(
@@ -126,9 +134,9 @@ def attractors_table(found: Sequence[LongTerm]) -> Table:
             np.array([each.stable for each in found], dtype=bool), "", "whether the orbit on the table is stable"
         ),
         "repeats_cycles": Column(np.array([each.repeats for each in found], dtype=np.int64), "1", repeats),
-        "alpha_2_least": numbers([each.gain(np.min) for each in found], "1", "gain of the smallest cycle peak"),
-        "alpha_2_mean": numbers([each.gain(np.mean) for each in found], "1", "mean gain of the cycle peaks"),
-        "alpha_2_greatest": numbers([each.gain(np.max) for each in found], "1", "gain of the greatest cycle peak"),
+        "alpha_2_least": numbers([each.gain(np.min) for each in found], "1", f"{PEAKS}: smallest"),
+        "alpha_2_mean": numbers([each.gain(np.mean) for each in found], "1", f"{PEAKS}: mean"),
+        "alpha_2_greatest": numbers([each.gain(np.max) for each in found], "1", f"{PEAKS}: largest"),
         "greatest_low": numbers(
             [each.low for each in found], "1", "lower end of the 95 % range of alpha_2_greatest over the specimens"
         ),

@@ -32,8 +32,10 @@ FAR = 0.15
 
 def far(settled: Settled) -> bool:
     """Whether a free motion is far from a periodic one."""
-    motion = settled.motion
-    return motion is not None and motion.greatest - motion.least > FAR * (motion.greatest + motion.least)
+    if settled.motion is None:
+        return False
+    least, greatest = settled.motion.peaks.least.drift, settled.motion.peaks.greatest.drift
+    return greatest - least > FAR * (greatest + least)
 
 
 def stable_above(specimen: Specimen, omega: float, amplitude: float) -> float | None:

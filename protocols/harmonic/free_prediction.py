@@ -3,6 +3,8 @@
 from math import isfinite
 from typing import Any
 
+import numpy as np
+
 from bench.config.model import BenchConfiguration
 from bench.prediction.attractors import CYCLES, LongTerm, long_term
 from bench.result_cache import cached
@@ -23,17 +25,18 @@ def with_free_prediction(
     Other points are unchanged. Nothing is added without a model of the table, or where disturbances of the orbit decay,
     since the free motion then tends to the orbit.
     """
-    greatest, multiplier = point.alpha_2_greatest, point.table_multiplier
-    if greatest is None or multiplier is None or multiplier <= 1.0:
+    greatest, doubt, multiplier = point.alpha_2_greatest, point.alpha_2_greatest_uncertainty, point.table_multiplier
+    if greatest is None or doubt is None or multiplier is None or multiplier <= 1.0:
         return point
     found = _predicted(specimen, point.omega_rad_s, amplitude, configuration, harmonics)
     if found is None:
         return point
     agrees, low, high = None, found["low"], found["high"]
-    if low is not None and point.alpha_2 and point.alpha_2_uncertainty is not None:
-        doubt = greatest * point.alpha_2_uncertainty / point.alpha_2
+    if low is not None:
         agrees = low - doubt <= greatest <= high + doubt
     fields: dict[str, Any] = {
+        "alpha_2_least_predicted": found["least"],
+        "alpha_2_mean_predicted": found["mean"],
         "alpha_2_greatest_predicted": found["greatest"],
         "alpha_2_greatest_low": low,
         "alpha_2_greatest_high": high,
@@ -72,7 +75,9 @@ def _numbers(motion: LongTerm) -> dict[str, Any]:
         return value if isfinite(value) else None
 
     return {
-        "greatest": float(motion.gains.max()) if motion.gains.size else None,
+        "least": known(motion.gain(np.min)),
+        "mean": known(motion.gain(np.mean)),
+        "greatest": known(motion.gain(np.max)),
         "repeats": motion.repeats,
         "low": known(motion.low),
         "high": known(motion.high),

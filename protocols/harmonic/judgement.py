@@ -67,6 +67,10 @@ class Conditions:
             return 0.0
         return log(more.alpha_2 / less.alpha_2) / log(around[1] / around[0])
 
+    def gain(self, peak: SteadyPeak, slope: float = 0.0) -> Gain:
+        """Gain of a peak; for `slope` see `slope()`, zero for a gain at the amplitude that occurred."""
+        return gain(peak, self.reference.peak, self.sensors, slope)
+
     def comparison(self, name: str, branch: Branch | None, peak: SteadyPeak) -> "_Comparison":
         """Comparison with the branch `name` at the amplitude of `peak`; `branch` is None if it does not exist."""
         return _Comparison(self, branch, self.slope(name, peak), predicted_fields(name, branch, self.known))
@@ -86,7 +90,7 @@ class _Comparison:
         expanded uncertainty (|E_n| <= 1, ISO 13528). The verdict is None without a prediction or a steady reference.
         """
         reference, branch = self.conditions.reference, self.branch
-        measured = gain(peak, reference.peak, self.conditions.sensors, self.slope)
+        measured = self.conditions.gain(peak, self.slope)
         uncertainty = self.predicted["alpha_2_predicted_uncertainty"]
         if branch is None or uncertainty is None or not reference.steadiness.steady:
             return measured, None
@@ -121,17 +125,18 @@ def judge(settled: Settled, conditions: Conditions, starts: int, held: Held | No
     name = _nearest(branches, peak) if steady else _ROCKING
     status = (PointStatus.STEADY if name == _ROCKING else PointStatus.RESTING) if steady else PointStatus.MODULATED
     comparison = conditions.comparison(name, branches.get(name), peak)
-    measured, agrees = comparison.compare(peak)
-    agrees = agrees if steady else None
+    # the gain of an unsteady motion is that of the largest peak that occurred, at whatever amplitude
+    measured, agrees = comparison.compare(peak) if steady else (conditions.gain(peak), None)
     on_table = None
     if shaker is not None and _ROCKING in branches and not (steady and branches[name].stable):
         on_table = _table_multiplier(branches[_ROCKING], shaker, conditions.harmonics)
+    free = _free_fields(settled.motion, conditions)
     orbit: dict[str, Any] = {}
     if settled.orbit is not None:
         gained, same = comparison.compare(settled.orbit)
         orbit = {"alpha_2_orbit": gained.alpha_2, "alpha_2_orbit_uncertainty": gained.uncertainty, "orbit_agrees": same}
     remarks = (
-        *_remarks(settled, conditions.reference, name, branches, agrees, on_table, orbit),
+        *_remarks(settled, conditions.reference, name, branches, agrees, on_table, free, orbit),
         *conditions.sensors.rough(measured.shapes),
     )
     point = HarmonicPoint(
@@ -141,7 +146,7 @@ def judge(settled: Settled, conditions: Conditions, starts: int, held: Held | No
         **comparison.fields(peak, measured, agrees, settled),
         bare_drift_peak_m=bare.drift,
         bare_amplitude_m_s2=bare.amplitude,
-        **_free_fields(settled.motion, bare.drift),
+        **free,
         **orbit,
         table_multiplier=on_table,
         starts_tried=starts,
@@ -194,16 +199,16 @@ def _table_multiplier(branch: Branch, shaker: Shaker, harmonics: int) -> float |
         return None
 
 
-def _free_fields(motion: FreeMotion | None, bare: float) -> dict[str, Any]:
-    """Fields of an unsteady motion; `bare` is the peak drift of the bare frame [m]."""
+def _free_fields(motion: FreeMotion | None, conditions: Conditions) -> dict[str, Any]:
+    """Fields of an unsteady motion."""
     if motion is None:
         return {}
-    found = {
-        "alpha_2_least": motion.least / bare,
-        "alpha_2_greatest": motion.greatest / bare,
-        "alpha_2_mean": motion.mean / bare,
-        "repeats_cycles": motion.repeats or None,
-    }
+    found: dict[str, Any] = {"repeats_cycles": motion.repeats or None}
+    peaks = {"least": motion.peaks.least, "mean": motion.peaks.mean, "greatest": motion.peaks.greatest}
+    for name, peak in peaks.items():
+        measured = conditions.gain(peak)
+        found[f"alpha_2_{name}"] = measured.alpha_2
+        found[f"alpha_2_{name}_uncertainty"] = measured.uncertainty
     return found | _rate_fields(motion.rate)
 
 
@@ -268,11 +273,19 @@ def _remarks(
     branches: dict[str, Branch],
     agrees: bool | None,
     on_table: float | None,
+    free: Mapping[str, Any],
     orbit: Mapping[str, Any],
 ) -> Iterator[str]:
     state, peak = settled.steadiness, settled.peak
     if not state.steady:
-        yield f"not steady after {settled.time:.0f} s: {_described(settled)}, cycle spread {100.0 * state.spread:.1f} %"
+        peaks = ""
+        if free:
+            least, greatest = (
+                f"{free[f'alpha_2_{end}']:.3f} +- {free[f'alpha_2_{end}_uncertainty']:.3f}"
+                for end in ("least", "greatest")
+            )
+            peaks = f", the largest drift within a period is between alpha_2 = {least} and {greatest}"
+        yield f"not steady after {settled.time:.0f} s: {_described(settled)}{peaks}"
         if on_table is not None:
             yield f"disturbances of the predicted orbit {_growth(branches[_ROCKING].multiplier, on_table)}"
         if orbit:

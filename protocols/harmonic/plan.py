@@ -263,7 +263,7 @@ class HarmonicPlan:
         if table is None:
             return Held(None, "the amplitude and phase of the table are unknown")
         sine = Sine(omega, self._amplitude, calibration)
-        free = settled.peak.drift if settled.motion is None else settled.motion.greatest
+        free = settled.peak.drift
         limits = self._configuration.limits
         largest = min(GROWTH * free, limits.warning.drift * limits.drift)
         report = self._report(omega, specimen)

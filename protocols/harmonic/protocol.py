@@ -79,13 +79,36 @@ class HarmonicPoint(Parameters):
     model_free: bool | None = quantity(
         None, "", "whether a held motion was stabilised without the model of specimen and table"
     )
-    alpha_2_least: float | None = quantity(None, "1", "gain of the smallest cycle peak of an unsteady free motion")
+    alpha_2_least: float | None = quantity(
+        None,
+        "1",
+        "gain of the largest drift within a period of an unsteady free motion: smallest over all positions of it",
+    )
+    alpha_2_least_uncertainty: float | None = quantity(
+        None, "1", "expanded uncertainty of alpha_2_least (k = 2), as a property of the measured cycles"
+    )
     alpha_2_greatest: float | None = quantity(
         None,
         "1",
-        "gain of the largest cycle peak of an unsteady free motion; equal to alpha_2 unless the point was held",
+        "gain of the largest drift of an unsteady free motion; equal to alpha_2 unless the point was held",
     )
-    alpha_2_mean: float | None = quantity(None, "1", "gain of the mean cycle peak of an unsteady motion")
+    alpha_2_greatest_uncertainty: float | None = quantity(
+        None, "1", "expanded uncertainty of alpha_2_greatest (k = 2), as a property of the measured cycles"
+    )
+    alpha_2_mean: float | None = quantity(
+        None,
+        "1",
+        "gain of the largest drift within a period of an unsteady free motion: mean over all positions of it",
+    )
+    alpha_2_mean_uncertainty: float | None = quantity(
+        None, "1", "expanded uncertainty of alpha_2_mean (k = 2), as a property of the measured cycles"
+    )
+    alpha_2_least_predicted: float | None = quantity(
+        None, "1", "predicted alpha_2_least of the long-term free motion; absent if the model's block falls"
+    )
+    alpha_2_mean_predicted: float | None = quantity(
+        None, "1", "predicted alpha_2_mean of the long-term free motion; absent if the model's block falls"
+    )
     alpha_2_greatest_predicted: float | None = quantity(
         None,
         "1",

@@ -6,9 +6,10 @@ from math import tau
 
 import numpy as np
 
+from bench.analysis.cycle_peaks import cycle_peaks
 from bench.analysis.cycles import Cycle, CycleAnalyser, mean_amplitude
 from bench.analysis.free_motion import CYCLES, KEPT, Rate, free_motion, orbit_peak
-from bench.analysis.gain import modulated_peak, steady_peak
+from bench.analysis.gain import steady_peak
 from bench.analysis.signals import ACCELERATION, SIGNALS
 from bench.analysis.steady import SteadyDetector
 from bench.config.model import BenchConfiguration
@@ -193,7 +194,7 @@ class HarmonicFollower:
         omega, used = series.sine.omega, series.recent[-self._cycles :]
         table = SineResponse.of(used, series.sine, series.turn or 1.0 + 0.0j)
         return Held(
-            peak=modulated_peak(used, omega) if self._settings.peak == "largest" else steady_peak(used, omega),
+            peak=cycle_peaks(used, omega).greatest if self._settings.peak == "largest" else steady_peak(used, omega),
             amplitude_error=table.amplitude_error,
             phase_error=table.phase_error,
             control=point.control_share or 0.0,
@@ -218,11 +219,11 @@ class HarmonicFollower:
         mean = how == "mean" or (how == "judged" and steadiness.steady)
         if not steadiness.steady and self._settings.measured_cycles is None:
             used = constant[-CYCLES:]
-        motion = None if steadiness.steady else free_motion(constant[-KEPT:])
+        motion = None if steadiness.steady else free_motion(constant[-KEPT:], omega)
         frame = linear_frame(self._configuration) if series.beta is None else None
         before = preceding(constant, used) if steadiness.steady else ()
         return Settled(
-            steady_peak(used, omega, before=before, frame=frame) if mean else modulated_peak(used, omega),
+            steady_peak(used, omega, before=before, frame=frame) if mean else cycle_peaks(used, omega).greatest,
             steadiness,
             series.waited,
             table.amplitude_error,

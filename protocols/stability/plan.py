@@ -221,7 +221,7 @@ class StabilityPlan:
 
     def _largest(self, settled: Settled) -> float:
         """Largest drift allowed during hold and release [m]."""
-        free = settled.peak.drift if settled.motion is None else settled.motion.greatest
+        free = settled.peak.drift
         limits = self._configuration.limits
         return min(GROWTH * free, limits.warning.drift * limits.drift)
 

@@ -8,7 +8,7 @@ from math import nan, sqrt, tau
 import numpy as np
 
 from bench.analysis.cycles import Cycle
-from bench.analysis.free_motion import SHORTEST, Rate, free_motion
+from bench.analysis.free_motion import SHORTEST, Rate, rate_of
 from bench.analysis.gain import SensorAccuracy, steady_peak
 from bench.analysis.signals import DRIFT
 from bench.analysis.steady import WINDOW, SteadyDetector
@@ -196,18 +196,19 @@ def _released(
         if not isinstance(outcome, Measured):
             return Fallen()
         for cycle in outcome.cycles:
-            deviation = float(cycle.extreme[DRIFT]) / drift - 1.0
-            yield Publish(HoldCycle(sine.omega, beta, cycles + count, float(cycle.extreme[DRIFT]), abs(deviation), 0.0))
+            peak = float(cycle.extreme[DRIFT])
+            deviation = peak / drift - 1.0
+            yield Publish(HoldCycle(sine.omega, beta, cycles + count, peak, abs(deviation), 0.0))
             if count > DELAY + FADING:
                 found.append(cycle)
             grown = abs(deviation) > GROWN and len(found) > SHORTEST
-            if grown or float(cycle.extreme[DRIFT]) > largest:
+            if grown or peak > largest:
                 return _rate(found)
     return _rate(found)
 
 
 def _rate(cycles: list[Cycle]) -> Rate | None:
-    return free_motion(cycles).rate if cycles else None
+    return rate_of(cycles) if cycles else None
 
 
 class Hold:

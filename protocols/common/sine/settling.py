@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from math import tau
 
 from bench.analysis.cycles import Cycle
-from bench.analysis.free_motion import CYCLES, KEPT, FreeMotion, Rate, free_motion, orbit_peak
-from bench.analysis.gain import SensorAccuracy, SteadyPeak, modulated_peak, steady_peak
+from bench.analysis.free_motion import KEPT, FreeMotion, Rate, free_motion, orbit_peak
+from bench.analysis.gain import SensorAccuracy, SteadyPeak, steady_peak
 from bench.analysis.linearity import LinearFrame
 from bench.analysis.sensor_accuracy import SensorUncertainty
 from bench.analysis.signals import ACCELERATION, DISPLACEMENT, LASER_1, LASER_2
@@ -151,7 +151,8 @@ def settle_and_measure(
                     peak = steady_peak(used, sine.omega, before=preceding(list(constant), used), frame=frame)
                 else:
                     kept = list(constant)
-                    peak, motion = modulated_peak(kept[-CYCLES:], sine.omega), free_motion(kept)
+                    motion = free_motion(kept, sine.omega)
+                    peak = motion.peaks.greatest
                     orbit = orbit_peak(kept, motion, sine.omega)
                 state = TableState(turn, drive, complex(table.achieved[0] / table.played[0]))
                 return Settled(

@@ -1,20 +1,20 @@
 """Motions that do not become steady: peaks, period and rate against the model's own samples and multipliers."""
 
-from itertools import pairwise
 from math import tau
 
 import numpy as np
 import pytest
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from bench.analysis.cycles import Cycle, CycleAnalyser
-from bench.analysis.free_motion import CYCLES, free_motion, orbit_peak
-from bench.analysis.gain import modulated_peak
+from bench.analysis.free_motion import CYCLES, free_motion, orbit_peak, rate_of
 from bench.analysis.signals import DRIFT, LASER_1, LASER_2, U1
 from sim.excitation import SineProgram, Sweep
 from sim.gain import predict_gain
 from sim.rocking import simulate
 from sim.specimen import Specimen
+from tests.made_cycles import pure_cycle
 
 Array = NDArray[np.float64]
 RATE = 2000.0
@@ -24,6 +24,12 @@ NOISE = 1e-6
 
 def cycles_after(beta: float, omega: float, wait: int) -> tuple[list[Cycle], Array]:
     """Cycles after a sweep from above and `wait` cycles, with the lasers' noise, and the drift [m] without it."""
+    cycles, drift, _ = motion_after(beta, omega, wait)
+    return cycles, drift
+
+
+def motion_after(beta: float, omega: float, wait: int) -> tuple[list[Cycle], Array, Array]:
+    """As `cycles_after`, with the displacement of the first storey [m]."""
     period = tau / omega
     length = (wait + CYCLES + 1) * period
     drive = SineProgram(
@@ -45,22 +51,29 @@ def cycles_after(beta: float, omega: float, wait: int) -> tuple[list[Cycle], Arr
     signals += NOISE * np.random.default_rng(0).standard_normal(signals.shape)
     cycles = CycleAnalyser(omega, RATE, 0).push(signals)
     assert len(cycles) == CYCLES
-    return cycles, u2 - u1
+    return cycles, u2 - u1, u1
 
 
-def by_cycle(drift: Array, omega: float) -> Array:
-    """Largest magnitude of the drift in each cycle [m]."""
-    ends = np.ceil(np.arange(CYCLES + 1) * tau / omega * RATE).astype(int)
-    return np.array([np.abs(drift[a:b]).max() for a, b in pairwise(ends)])
+def within_periods(drift: Array, omega: float) -> Array:
+    """Largest magnitude of the drift in each position of a period [m]."""
+    return sliding_window_view(np.abs(drift), round(tau / omega * RATE)).max(axis=1)
 
 
 @pytest.mark.parametrize(("beta", "omega", "wait"), [(0.97, 15.0, 300), (0.64, 12.5, 300), (0.97, 14.7, 200)])
 def test_peaks_of_a_motion_beside_an_unstable_orbit(beta: float, omega: float, wait: int) -> None:
-    cycles, drift = cycles_after(beta, omega, wait)
-    true, found = by_cycle(drift, omega), free_motion(cycles)
-    for measured, expected in ((found.least, true.min()), (found.mean, true.mean()), (found.greatest, true.max())):
-        assert measured == pytest.approx(float(expected), rel=1e-3)
-    assert modulated_peak(cycles, omega).drift == found.greatest
+    cycles, drift, u1 = motion_after(beta, omega, wait)
+    true, found = within_periods(drift, omega), free_motion(cycles, omega)
+    peaks = found.peaks
+    for measured, expected in ((peaks.least, true.min()), (peaks.mean, true.mean()), (peaks.greatest, true.max())):
+        assert measured.drift == pytest.approx(float(expected), rel=1e-3)
+    first, second = peaks.greatest.readings.lasers
+    assert peaks.greatest.readings.sign * (second - first) == pytest.approx(peaks.greatest.drift, abs=2.0 * NOISE)
+    top = int(np.abs(drift).argmax())
+    assert first == pytest.approx(float(u1[top]), abs=1e-3 * peaks.greatest.drift)
+    # at the largest drift both storeys have the same velocity
+    speeds = peaks.greatest.readings.speeds
+    velocity = float(np.gradient(u1)[top] * RATE)
+    assert speeds == pytest.approx((velocity, velocity), abs=0.02 * omega * peaks.greatest.drift)
     assert found.rate is None or not found.rate.decays
 
 
@@ -72,13 +85,13 @@ def test_a_fit_of_one_cycle_overshoots_the_largest_peak() -> None:
 
 def test_a_period_of_nine_cycles_is_found() -> None:
     cycles, _ = cycles_after(0.97, 15.0, 300)
-    assert free_motion(cycles).repeats == 9
+    assert free_motion(cycles, 15.0).repeats == 9
 
 
 @pytest.mark.parametrize(("beta", "omega", "wait"), [(0.4, 16.0, 10), (0.4, 17.0, 10), (0.25, 17.5, 20)])
 def test_the_rate_of_a_slow_approach_is_the_multiplier_of_the_orbit(beta: float, omega: float, wait: int) -> None:
     cycles, _ = cycles_after(beta, omega, wait)
-    found = free_motion(cycles).rate
+    found = rate_of(cycles)
     orbit = predict_gain(Specimen().coupled(beta), omega, AMPLITUDE).rocking
     assert found is not None
     assert orbit is not None
@@ -94,7 +107,7 @@ def test_the_mean_cycle_of_a_motion_about_an_unstable_orbit_has_the_peak_of_the_
 ) -> None:
     cycles, _ = cycles_after(beta, omega, wait)
     orbit = predict_gain(Specimen().coupled(beta), omega, AMPLITUDE).rocking
-    found = orbit_peak(cycles, free_motion(cycles), omega)
+    found = orbit_peak(cycles, free_motion(cycles, omega), omega)
     assert orbit is not None
     assert found is not None
     assert not orbit.stable
@@ -105,15 +118,12 @@ def test_the_mean_cycle_of_a_motion_about_an_unstable_orbit_has_the_peak_of_the_
 
 def test_a_motion_far_from_the_orbit_says_nothing_of_its_peak() -> None:
     cycles, _ = cycles_after(0.97, 15.0, 300)
-    assert orbit_peak(cycles, free_motion(cycles), 15.0) is None
+    assert orbit_peak(cycles, free_motion(cycles, 15.0), 15.0) is None
 
 
 def pure(amplitudes: NDArray[np.complex128]) -> list[Cycle]:
     """Cycles whose lasers, first storey and drift have these complex amplitudes."""
-    return [
-        Cycle(k, 600, np.zeros((3, 7)), np.full(7, each), np.full(7, abs(each)), np.full(7, abs(each)), np.zeros(7))
-        for k, each in enumerate(amplitudes)
-    ]
+    return [pure_cycle(k, np.full(7, each)) for k, each in enumerate(amplitudes)]
 
 
 @pytest.mark.parametrize("modulus", [0.95, 0.999, 1.02])
@@ -124,7 +134,7 @@ def test_the_multiplier_of_a_linear_map_is_not_biased_by_noise(modulus: float, n
     for _ in range(40):
         steps = (modulus * np.exp(2.8j)) ** np.arange(CYCLES)
         disturbed = noise * (random.standard_normal((CYCLES, 2)) @ np.array([1.0, 1.0j]))
-        found = free_motion(pure(1.0 + 0.02 * steps + disturbed)).rate
+        found = rate_of(pure(1.0 + 0.02 * steps + disturbed))
         assert found is not None
         assert found.angle == pytest.approx(2.8, abs=0.01 if noise else 1e-9)
         errors.append((found.modulus - modulus) / max(found.uncertainty, 1e-9))
@@ -134,7 +144,7 @@ def test_the_multiplier_of_a_linear_map_is_not_biased_by_noise(modulus: float, n
 
 def test_white_noise_has_no_rate_and_no_period() -> None:
     random = np.random.default_rng(5)
-    found = free_motion(pure(1.0 + 0.05 * (random.standard_normal((CYCLES, 2)) @ np.array([1.0, 1.0j]))))
+    found = free_motion(pure(1.0 + 0.05 * (random.standard_normal((CYCLES, 2)) @ np.array([1.0, 1.0j]))), 15.0)
     assert (found.rate, found.repeats) == (None, 0)
 
 
@@ -146,6 +156,6 @@ def test_a_slow_approach_from_one_side_says_nothing_of_the_orbit(deviation: floa
     for _ in range(20):
         steps = 1.0 + deviation * 0.99 ** np.arange(cycles)
         disturbed = pure(steps + 4e-5 * (random.standard_normal((cycles, 2)) @ np.array([1.0, 1.0j])))
-        found = free_motion(disturbed)
+        found = free_motion(disturbed, 16.0)
         assert found.rate is None or found.rate.uncertainty <= 0.1
         assert orbit_peak(disturbed, found, 16.0) is None

@@ -9,8 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from bench.analysis.cycle_peaks import cycle_peaks
 from bench.analysis.cycles import Cycle, fit_cycle
-from bench.analysis.gain import DRAWS, SEED, SensorAccuracy, SteadyPeak, gain, modulated_peak, steady_peak
+from bench.analysis.gain import DRAWS, SEED, SensorAccuracy, SteadyPeak, gain, steady_peak
 from bench.analysis.laser_calibration import LaserCalibration, LaserCurve
 from bench.analysis.running_gain import shared_draws
 from bench.analysis.sensor_accuracy import SCALES, Draws, PeakReadings, SensorUncertainty
@@ -111,9 +112,11 @@ def test_correlated_cycles_count_less() -> None:
     assert covered / 300 > 0.85  # two standard errors of independent samples would cover about 60 %
 
 
-def test_a_modulated_motion_counts_with_its_largest_peak() -> None:
+def test_an_unsteady_motion_counts_with_the_peaks_of_its_cycles() -> None:
     drifts = 1.0 + 0.3 * np.sin(np.arange(40))
-    assert modulated_peak(_cycles(drifts), 1.0).drift == drifts.max()
+    peaks = cycle_peaks(_cycles(np.repeat(drifts, 4)), 1.0)
+    assert peaks.least.drift == pytest.approx(drifts.min(), rel=1e-4)
+    assert peaks.greatest.drift == pytest.approx(drifts.max(), rel=1e-4)
 
 
 def test_a_bound_of_a_systematic_effect_counts_as_a_rectangular_distribution() -> None:

@@ -21,6 +21,7 @@ def free(greatest: float, multiplier: float | None = 1.046) -> HarmonicPoint:
         alpha_2=greatest,
         alpha_2_uncertainty=0.01 * greatest,
         alpha_2_greatest=greatest,
+        alpha_2_greatest_uncertainty=0.01 * greatest,
         table_multiplier=multiplier,
         reason="not steady",
     )

@@ -6,6 +6,7 @@ from math import hypot
 import numpy as np
 import pytest
 
+from bench.analysis.cycle_peaks import CyclePeaks
 from bench.analysis.free_motion import FreeMotion, Rate
 from bench.analysis.gain import SensorAccuracy, SteadyPeak
 from bench.analysis.sensor_accuracy import PeakReadings, SensorUncertainty
@@ -152,9 +153,10 @@ def test_a_resting_block_says_that_the_stable_rocking_motion_was_not_reached() -
 @pytest.mark.parametrize("off", [0.0, 0.5])
 def test_the_orbit_about_which_a_motion_turns_is_compared_with_the_prediction(off: float) -> None:
     peaks = PREDICTED.branches["rocking"].orbit.peaks
+    least, mean, greatest = (_settled(ratio * peaks.drift, peaks.u1).peak for ratio in (0.95, 1.0, 1.05))
     turning = replace(
         _settled(1.05 * peaks.drift, peaks.u1, Steadiness(False, 0.1, 0.0, 0)),
-        motion=FreeMotion(0.95 * peaks.drift, peaks.drift, 1.05 * peaks.drift, 0, Rate(0.999, 0.001, 2.7), 96),
+        motion=FreeMotion(CyclePeaks(least, mean, greatest), 0, Rate(0.999, 0.001, 2.7)),
         orbit=_settled((1.0 + off) * peaks.drift, peaks.u1).peak,
     )
     point = judge(turning, conditions(SpecimenKnowledge()), 1)
@@ -162,5 +164,6 @@ def test_the_orbit_about_which_a_motion_turns_is_compared_with_the_prediction(of
     assert point.alpha_2_orbit == pytest.approx((1.0 + off) * PREDICTED.branches["rocking"].alpha_2)
     assert point.alpha_2_least is not None
     assert point.alpha_2_least < point.alpha_2_orbit or off == 0.0
+    assert (point.alpha_2_greatest, point.alpha_2_greatest_uncertainty) == (point.alpha_2, point.alpha_2_uncertainty)
     assert (point.multiplier, point.multiplier_uncertainty) == (0.999, 0.002)
     assert "the mean cycle gives the gain of the orbit" in point.reason
