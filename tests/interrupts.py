@@ -163,7 +163,8 @@ class Bed:
         """Start the command and interrupt it at its moment; None if it ended before."""
         command, moment, second = drawn.command, drawn.after, drawn.again
         with tempfile.TemporaryDirectory(dir=self.folder) as made:
-            work, temporary = Path(made, "work"), Path(made, "temporary")
+            # a short name: the path of a socket in it has at most 107 characters
+            work, temporary = Path(made, "work"), Path(made, "t")
             work.mkdir()
             temporary.mkdir()
             queue = shutil.copy(self.queue, work)
@@ -173,6 +174,8 @@ class Bed:
             line = [names.get(word, word.replace("NEW", str(work / "new"))) for word in command.line.split()]
             environment = os.environ | {"TMPDIR": str(temporary), "QT_QPA_PLATFORM": "offscreen"}
             environment.pop("PYTHONDONTWRITEBYTECODE", None)
+            # the suite switches announcements off; here they belong to what must not be left
+            environment.pop("ROCKBENCH_SESSIONS", None)
             if command.cold:
                 environment["NUMBA_CACHE_DIR"] = str(Path(made, "cache"))
             process = subprocess.Popen(
