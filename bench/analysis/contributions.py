@@ -38,7 +38,7 @@ SOURCES: Mapping[str, Source] = {
     "amplitude of the table": Source(
         "B", "scale of the accelerometer, times the predicted slope of the gain", "calibrate the accelerometer"
     ),
-    "noise of the peaks": Source("A", "residual of the signals around the peaks", "repeat the record"),
+    "noise of the peaks": Source("A", "residual of the signals around the peaks", "repeat the test"),
     "noise of the table's motion": Source(
         "A", "simulations with the noise of the accelerometer at rest", "use an accelerometer with less noise"
     ),

@@ -7,11 +7,16 @@ cycle by 5 %. The largest drift within a period that slides over the motion does
 The drift is smoothed by parabolas, not taken from fits of the cycles: a fit by harmonics of the drive overshoots the
 peak, by 10 % if the amplitude changes by half within a few cycles, because the motion then differs at the two ends of
 the cycle. The uncertainties are those of the motion that occurred; they do not include how much other cycles differ.
+Where cycles are missing, no period spans the gap.
+
+Of N equal peaks with noise, the largest is too large by up to sqrt(2 ln N) standard deviations of the noise, the
+smallest too small; how many peaks are equal is not known. The bound counts as a rectangular distribution. A mean of
+largest values is too large by less than one standard deviation.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import sqrt, tau
+from math import log, sqrt, tau
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +24,7 @@ from numpy.typing import NDArray
 from bench.analysis.cycles import SHARE, Cycle, mean_amplitude, mean_waves, parabola
 from bench.analysis.gain import SteadyPeak
 from bench.analysis.sensor_accuracy import PeakReadings
-from bench.analysis.signals import ACCELERATION, U1
+from bench.analysis.signals import ACCELERATION, DRIFT, U1
 from sim.attractor import largest_within
 
 Array = NDArray[np.float64]
@@ -50,11 +55,15 @@ def cycle_peaks(cycles: Sequence[Cycle], omega: float) -> CyclePeaks:
 
     mean = float(np.concatenate([each.largest for each in windows]).mean())
     tops = [each.seen(k) for each in windows for k in range(0, each.largest.size, each.length)]
+    chosen = noise * sqrt(1.0 + 2.0 * log(len(cycles)) / 3.0)
     return CyclePeaks(
-        least=of(float(least.largest.min()), least.seen(int(least.largest.argmin()))[None], noise),
-        # about one independent peak per cycle contributes to the mean
-        mean=of(mean, np.array(tops), noise / sqrt(len(cycles))),
-        greatest=of(float(greatest.largest.max()), greatest.seen(int(greatest.largest.argmax()))[None], noise),
+        least=of(float(least.largest.min()), least.seen(int(least.largest.argmin())), chosen),
+        mean=of(mean, np.mean([_turned(each) for each in tops], axis=0), noise),
+        greatest=of(
+            max(float(cycle.extreme[DRIFT]) for cycle in cycles),
+            greatest.seen(int(greatest.largest.argmax())),
+            chosen,
+        ),
     )
 
 
@@ -74,19 +83,26 @@ class _Windows:
     @classmethod
     def of(cls, cycles: Sequence[Cycle]) -> "_Windows":
         traces = np.concatenate([cycle.traces for cycle in cycles]).astype(np.float64)
-        length = len(traces) // len(cycles)
-        smooth, noise = _smoothed(traces, max(length // (2 * SHARE), 1))
+        length = round(len(traces) / len(cycles))
+        smooth, noise = _smoothed(traces, _half(length))
         return cls(smooth, noise, length, largest_within(np.abs(smooth[:, 0]), length))
 
     def seen(self, window: int) -> Array:
-        """Readings of both lasers [m] at the peak within one window, and their changes per cycle / (2 pi), shape (2,
-        2).
+        """Readings of both lasers [m] at the peak within one window, their changes per cycle / (2 pi), and their ranges
+        around it, shape (3, 2).
         """
         top = window + int(np.abs(self.smooth[window : window + self.length, 0]).argmax())
-        step = max(self.length // (2 * SHARE), 1)
+        step = _half(self.length)
         first, last = max(top - step, 0), min(top + step, len(self.smooth) - 1)
         rates = (self.smooth[last, 1:] - self.smooth[first, 1:]) * (self.length / (tau * (last - first)))
-        return np.stack((self.smooth[top, 1:], rates))
+        return np.stack((self.smooth[top, 1:], rates, np.ptp(self.smooth[first : last + 1, 1:], axis=0)))
+
+
+def _half(length: int) -> int:
+    """Number of samples on each side of a sample to which a parabola is fitted: at least two, so that it has a
+    residual.
+    """
+    return max(length // (2 * SHARE), 2)
 
 
 def _smoothed(traces: Array, half: int) -> tuple[Array, float]:
@@ -116,18 +132,22 @@ def _uninterrupted(cycles: Sequence[Cycle]) -> list[list[Cycle]]:
     return found
 
 
-def _readings(drift: float, there: Array, omega: float) -> PeakReadings:
-    """Mean of the readings at several peaks, shape (n, 2, 2), all turned to the side of the first peak."""
-    sides = np.sign(there[:, 0, 1] - there[:, 0, 0])
-    (first, second), (rate_1, rate_2) = np.mean((sides * sides[0])[:, None, None] * there, axis=0).tolist()
+def _turned(seen: Array) -> Array:
+    """What is `seen` at a peak, turned to the side on which the drift is positive."""
+    side = -1.0 if seen[0, 1] < seen[0, 0] else 1.0
+    return seen * np.array([[side], [side], [1.0]])
+
+
+def _readings(drift: float, seen: Array, omega: float) -> PeakReadings:
+    (first, second), (rate_1, rate_2), (range_1, range_2) = seen.tolist()
     return PeakReadings(
         drift=drift,
-        sign=float(sides[0]) or 1.0,
+        sign=-1.0 if second < first else 1.0,
         lasers=(first, second),
         speeds=(omega * rate_1, omega * rate_2),
         zero=np.zeros((2, 1)),
-        swings=(0.0, 0.0),
-        # rounding errors around the peak are part of its noise
-        terms=0.0,
+        # one rounding error, averaged over the steps that a laser passes around the peak
+        swings=(range_1, range_2),
+        terms=1.0,
         at_rest=True,
     )

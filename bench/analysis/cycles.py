@@ -20,8 +20,6 @@ HARMONICS = 10
 TRACES = (DRIFT, LASER_1, LASER_2)
 """Signals whose samples are kept with a cycle."""
 
-_NO_TRACES = np.zeros((0, len(TRACES)), dtype=np.float32)
-
 COMPLETE = 0.98
 """Minimum fraction of valid samples in a cycle: with fewer, a laser that leaves its range at every peak would bias the
 fit.
@@ -55,8 +53,8 @@ class Cycle:
     `fundamental` holds the complex amplitudes c with signal = Re(c exp(-i phase)); `peak` is the largest magnitude of
     the fitted motion, including its mean; `noise` is the rms of the residual; shape (m,) each. `extreme`, shape (m,),
     is the largest magnitude of the smoothed samples. It replaces `peak` for an unsteady motion, which the fit
-    overshoots because the motion differs between the two ends of the cycle. `traces` [m], shape
-    (samples, 3), are the samples of the drift and of both lasers (no rows if there are no such signals).
+    overshoots because the motion differs between the two ends of the cycle. `traces` [m], shape (n, 3), are all samples
+    of the drift and of both lasers, missing ones interpolated; no rows if there are no such signals.
     """
 
     index: int
@@ -88,7 +86,7 @@ def fit_cycle(
     there are few samples. Returns None if too many samples are missing (NaN) or there are too few for one harmonic.
     """
     finite = np.isfinite(values)
-    share = 1.0
+    share, traces = 1.0, _traces(values, finite)
     if not finite.all():
         valid = finite.all(axis=1)
         phase, values, share = phase[valid], values[valid], valid.mean()
@@ -107,8 +105,22 @@ def fit_cycle(
         peak=_peak(waveform),
         extreme=_extreme(values),
         noise=np.sqrt(np.mean(residual**2, axis=0)),
-        traces=values[:, TRACES].astype(np.float32) if values.shape[1] > max(TRACES) else _NO_TRACES,
+        traces=traces,
     )
+
+
+def _traces(values: NDArray[np.float64], finite: NDArray[np.bool_]) -> NDArray[np.float32]:
+    """Samples of the signals TRACES, with missing ones interpolated."""
+    if values.shape[1] <= max(TRACES):
+        return np.zeros((0, len(TRACES)), dtype=np.float32)
+    found = values[:, TRACES].astype(np.float32)
+    if not finite.all():
+        places = np.arange(len(values))
+        for trace, column in zip(found.T, TRACES, strict=True):
+            valid = finite[:, column]
+            if valid.any():
+                trace[~valid] = np.interp(places[~valid], places[valid], values[valid, column])
+    return found
 
 
 SHARE = 16

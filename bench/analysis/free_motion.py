@@ -1,4 +1,4 @@
-"""Description of an unsteady motion: peaks of its cycles, period, and rate of approach to a periodic motion."""
+"""Description of an unsteady motion: its peaks, its period, and the rate of its approach to a periodic motion."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -61,8 +61,8 @@ class Rate:
 
 @dataclass(frozen=True)
 class FreeMotion:
-    """Peaks of the drift per cycle. `repeats` is the number of cycles after which the motion repeats, 0 if it does not;
-    `rate` is None if the changes are too few, too noisy or not those of a linear system.
+    """Peaks of the drift, see `bench.analysis.cycle_peaks`. `repeats` is the number of cycles after which the motion
+    repeats, 0 if it does not; `rate` is None if the changes are too few, too noisy or not those of a linear system.
     """
 
     peaks: CyclePeaks

@@ -58,14 +58,14 @@ def check_whole(entry: hdf5.Group, counted: Mapping[str, int], size: int) -> Non
 FORMAT, FORMAT_VERSION = "rocking-bench record", 2
 """Name and version of the format of a campaign file."""
 
-WORDING = 9
+WORDING = 10
 """Version of the sentences in journal and results. Replay compares these sentences only with those of a file of the
 same version.
 """
 
-INTERVALS = 5
-"""Version of the evaluation of uncertainties. Replay compares uncertainties only with those of a file of the same
-version.
+INTERVALS = 6
+"""Version of the evaluation of uncertainties, and of the least and mean peak of an unsteady motion. Replay compares
+them only with those of a file of the same version.
 """
 
 ANALYSIS, ANALYSIS_VERSION = "rocking-bench analysis", 1

@@ -1,6 +1,6 @@
 """Long-term motions of the coupled specimen on the table, where the periodic rocking motion is unstable."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import nan
 
@@ -38,11 +38,12 @@ class LongTerm:
     point.
 
     If the orbit on the table is `stable`, the motion is the orbit. The motion repeats after `repeats` cycles; 0 if it
-    does not repeat, or if the block falls. `gains`, shape (n,), are the gains of the peaks of the last cycles, and
-    `within`, shape (m,), those of the largest drift within a period that slides over them; both are empty if the block
-    falls, which happens after `fallen` cycles. `low` and `high` enclose the gains of the
-    greatest peaks for 95 % of the drawn specimens whose block does not fall, and `falls` is the fraction of specimens
-    whose block falls; all three are NaN without drawn specimens, `low` and `high` also if every block falls.
+    does not repeat, or if the block falls. `gains`, shape (n,), are the gains of the peaks of the last cycles, without
+    entries if the block falls, which happens after `fallen` cycles. `least`, `mean` and `greatest` are the gains of the
+    largest drift within a period that slides over these cycles, NaN if the block falls. `low` and `high` enclose the
+    gains of the greatest peaks for 95 % of the drawn specimens whose block does not fall, and `falls` is the fraction
+    of specimens whose block falls; all three are NaN without drawn specimens, `low` and `high` also if every block
+    falls.
     """
 
     omega: float
@@ -50,16 +51,14 @@ class LongTerm:
     orbit: float
     stable: bool
     gains: NDArray[np.float64]
-    within: NDArray[np.float64]
+    least: float
+    mean: float
+    greatest: float
     repeats: int
     fallen: int | None = None
     low: float = nan
     high: float = nan
     falls: float = nan
-
-    def gain(self, of: Callable[[NDArray[np.float64]], np.float64]) -> float:
-        """Result of the function `of`, such as `np.mean`, for the gains `within` a period; NaN if the block falls."""
-        return float(of(self.within)) if self.within.size else nan
 
 
 def long_term(
@@ -80,8 +79,8 @@ def long_term(
     fixed = branch.orbit
     orbit, beta = table_orbit(fixed, shaker, harmonics), fixed.specimen.label or 0.0
     if orbit.stable:
-        gain = np.array([branch.alpha_2])
-        return LongTerm(fixed.omega, beta, branch.alpha_2, True, gain, gain, 1)
+        gain = branch.alpha_2
+        return LongTerm(fixed.omega, beta, gain, True, np.array([gain]), gain, gain, gain, repeats=1)
 
     def motions(specimen: Specimen) -> tuple[float, Attractor]:
         bare = steady_peaks(specimen.bare(), fixed.omega, fixed.amplitude).drift
@@ -89,12 +88,24 @@ def long_term(
 
     drawn = known.draws(fixed.specimen, members, np.random.default_rng(SEED))
     (bare, motion), *others = in_threads(motions, [fixed.specimen, *drawn])
-    own, within = motion.peaks[:, 1] / bare, motion.within / bare
-    greatest = [float(other.within.max()) / each for each, other in others if other.fallen is None]
+    greatest = [other.within[2] / each for each, other in others if other.fallen is None]
     low, high = np.quantile(greatest, RANGE).tolist() if greatest else (nan, nan)
     falls = 1.0 - len(greatest) / len(others) if others else nan
+    least, mean, most = (each / bare for each in motion.within)
     return LongTerm(
-        fixed.omega, beta, branch.alpha_2, False, own, within, motion.repeats, motion.fallen, low, high, falls
+        fixed.omega,
+        beta,
+        branch.alpha_2,
+        stable=False,
+        gains=motion.peaks[:, 1] / bare,
+        least=least,
+        mean=mean,
+        greatest=most,
+        repeats=motion.repeats,
+        fallen=motion.fallen,
+        low=low,
+        high=high,
+        falls=falls,
     )
 
 
@@ -134,9 +145,9 @@ def attractors_table(found: Sequence[LongTerm]) -> Table:
             np.array([each.stable for each in found], dtype=bool), "", "whether the orbit on the table is stable"
         ),
         "repeats_cycles": Column(np.array([each.repeats for each in found], dtype=np.int64), "1", repeats),
-        "alpha_2_least": numbers([each.gain(np.min) for each in found], "1", f"{PEAKS}: smallest"),
-        "alpha_2_mean": numbers([each.gain(np.mean) for each in found], "1", f"{PEAKS}: mean"),
-        "alpha_2_greatest": numbers([each.gain(np.max) for each in found], "1", f"{PEAKS}: largest"),
+        "alpha_2_least": numbers([each.least for each in found], "1", f"{PEAKS}: smallest"),
+        "alpha_2_mean": numbers([each.mean for each in found], "1", f"{PEAKS}: mean"),
+        "alpha_2_greatest": numbers([each.greatest for each in found], "1", f"{PEAKS}: largest"),
         "greatest_low": numbers(
             [each.low for each in found], "1", "lower end of the 95 % range of alpha_2_greatest over the specimens"
         ),

@@ -32,8 +32,11 @@ DRIVE_ROUNDING = 1e-6
 
 ROWS_AT_ONCE = 2**16
 
-OF_INTERVALS = ("uncertainty", "dominating", "agrees", "alpha_1_low", "alpha_1_high", "alpha_2_low", "alpha_2_high")
-"""Parts of the names of columns that depend on the evaluation of uncertainties."""
+OF_INTERVALS = (
+    *("uncertainty", "dominating", "degrees_of_freedom", "agrees"),
+    *("alpha_1_low", "alpha_1_high", "alpha_2_low", "alpha_2_high", "alpha_2_least", "alpha_2_mean"),
+)
+"""Parts of the names of columns that depend on `bench.datafile.opening.INTERVALS`."""
 
 DRIVE, JOURNAL, POINTS, ENDING = "drive samples", "journal entries", "points", "ending"
 """Parts of a recording that are compared in addition to its other tables."""

@@ -1,9 +1,7 @@
 """Comparison of a free motion, one that is not held, with the model's long-term motion, where the orbit is unstable."""
 
-from math import isfinite
+from math import hypot, isfinite
 from typing import Any
-
-import numpy as np
 
 from bench.config.model import BenchConfiguration
 from bench.prediction.attractors import CYCLES, LongTerm, long_term
@@ -32,6 +30,8 @@ def with_free_prediction(
     if found is None:
         return point
     agrees, low, high = None, found["low"], found["high"]
+    # the prediction is for the requested amplitude, to which the peaks are assumed to be proportional
+    doubt = hypot(doubt, 2.0 * configuration.sensors.table_scale * greatest)
     if low is not None:
         agrees = low - doubt <= greatest <= high + doubt
     fields: dict[str, Any] = {
@@ -75,9 +75,9 @@ def _numbers(motion: LongTerm) -> dict[str, Any]:
         return value if isfinite(value) else None
 
     return {
-        "least": known(motion.gain(np.min)),
-        "mean": known(motion.gain(np.mean)),
-        "greatest": known(motion.gain(np.max)),
+        "least": known(motion.least),
+        "mean": known(motion.mean),
+        "greatest": known(motion.greatest),
         "repeats": motion.repeats,
         "low": known(motion.low),
         "high": known(motion.high),

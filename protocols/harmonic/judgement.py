@@ -8,6 +8,7 @@ from typing import Any
 from bench.analysis.free_motion import FreeMotion, Rate
 from bench.analysis.gain import Gain, SteadyPeak, gain
 from bench.analysis.sensor_accuracy import SensorUncertainty
+from bench.analysis.uncertainty import plus_minus
 from bench.prediction.bands import expanded_uncertainty
 from protocols.common.sine.settling import Held, Settled
 from protocols.harmonic.protocol import HarmonicPoint, PointStatus
@@ -125,7 +126,7 @@ def judge(settled: Settled, conditions: Conditions, starts: int, held: Held | No
     name = _nearest(branches, peak) if steady else _ROCKING
     status = (PointStatus.STEADY if name == _ROCKING else PointStatus.RESTING) if steady else PointStatus.MODULATED
     comparison = conditions.comparison(name, branches.get(name), peak)
-    # the gain of an unsteady motion is that of the largest peak that occurred, at whatever amplitude
+    # an unsteady motion has the gain at the amplitude that occurred, which no branch describes
     measured, agrees = comparison.compare(peak) if steady else (conditions.gain(peak), None)
     on_table = None
     if shaker is not None and _ROCKING in branches and not (steady and branches[name].stable):
@@ -281,8 +282,7 @@ def _remarks(
         peaks = ""
         if free:
             least, greatest = (
-                f"{free[f'alpha_2_{end}']:.3f} +- {free[f'alpha_2_{end}_uncertainty']:.3f}"
-                for end in ("least", "greatest")
+                plus_minus(free[f"alpha_2_{end}"], free[f"alpha_2_{end}_uncertainty"]) for end in ("least", "greatest")
             )
             peaks = f", the largest drift within a period is between alpha_2 = {least} and {greatest}"
         yield f"not steady after {settled.time:.0f} s: {_described(settled)}{peaks}"

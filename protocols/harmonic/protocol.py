@@ -90,7 +90,7 @@ class HarmonicPoint(Parameters):
     alpha_2_greatest: float | None = quantity(
         None,
         "1",
-        "gain of the largest drift of an unsteady free motion; equal to alpha_2 unless the point was held",
+        "gain of the largest drift of an unsteady free motion",
     )
     alpha_2_greatest_uncertainty: float | None = quantity(
         None, "1", "expanded uncertainty of alpha_2_greatest (k = 2), as a property of the measured cycles"
@@ -256,7 +256,14 @@ PROTOCOL = Protocol(
     report=deferred("protocols.harmonic.report:harmonic_sections"),
     view=RunView(
         headline="alpha_2",
-        labels={"alpha_2": "α₂", "alpha_2_orbit": "α₂ of the orbit", "multiplier": "multiplier"},
+        labels={
+            "alpha_2": "α₂",
+            "alpha_2_least": "least α₂",
+            "alpha_2_mean": "mean α₂",
+            "alpha_2_greatest": "largest α₂",
+            "alpha_2_orbit": "α₂ of the orbit",
+            "multiplier": "multiplier",
+        },
         matrix=(Axis("beta", "beta", "β {:g}"), Axis("omega", "omega_rad_s", "{:g} rad/s")),
         live=deferred("protocols.harmonic.live:gain_view"),
     ),

@@ -52,8 +52,8 @@ def _results_section(campaign: Campaign) -> Section:
         f"motion that can be compared, of which {counted(sum(compared), 'agrees', 'agree')} with the "
         "prediction. Both gains are for the achieved amplitudes of the table and for the branch of the point. They "
         "agree when they differ by no more than their combined uncertainty (root sum of squares). The uncertainty of a "
-        "measured gain is expanded (k = 2) and includes sensors and scatter; that of a predicted gain (k = 2, to first "
-        "order) follows from the uncertainty of the specimen.",
+        "measured gain is expanded (k = 2) and includes sensors and scatter, for a modulated motion only sensors and "
+        "noise; that of a predicted gain (k = 2, to first order) follows from the uncertainty of the specimen.",
         _gains(campaign, points),
         _conditions(points),
         *_budget_parts(points),

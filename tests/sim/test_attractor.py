@@ -5,8 +5,9 @@ from math import tau
 
 import numpy as np
 import pytest
+from numpy.lib.stride_tricks import sliding_window_view
 
-from sim.attractor import KEPT, attractor, period_of
+from sim.attractor import KEPT, attractor, largest_within, period_of
 from sim.excitation import SineProgram, Sweep
 from sim.rocking import simulate
 from sim.shaker import Shaker
@@ -57,6 +58,12 @@ def test_a_fall_ends_the_motion() -> None:
     assert found.fallen < 300
     assert found.peaks.shape == (0, 2)
     assert found.repeats == 0
+
+
+@pytest.mark.parametrize(("n", "length"), [(1, 1), (7, 7), (20, 7), (21, 7), (100, 1), (838, 419)])
+def test_the_largest_value_within_a_window_is_that_of_every_position(n: int, length: int) -> None:
+    values = np.random.default_rng(n).standard_normal(n)
+    assert np.array_equal(largest_within(values, length), sliding_window_view(values, length).max(axis=1))
 
 
 @pytest.mark.parametrize("period", [2, 7, 24])

@@ -63,7 +63,9 @@ class Mark:
 
     @property
     def varies(self) -> bool:
-        """Whether the motion was modulated: the gain is then that of its largest cycle."""
+        """Whether the motion was modulated: the gain is then that of its largest drift, which the next
+        test need not repeat.
+        """
         return self.status == "modulated"
 
     @property
@@ -149,7 +151,8 @@ def _line(
 @dataclass(frozen=True)
 class Difference:
     """A point in the reference and in another run; a gain that was not measured is None. `uncertainty` is the expanded
-    uncertainty (k = 2) of the difference, with the two gains assumed independent; NaN unless both were measured.
+    uncertainty (k = 2) of the difference, with the two gains assumed independent; NaN unless both were measured, and
+    for modulated motions, whose uncertainty does not say how much the largest drift varies from test to test.
     """
 
     point: str
@@ -187,7 +190,7 @@ def _difference(first: Mark | None, second: Mark | None) -> Difference:
     assert known is not None
     gains = [None if mark is None else mark.gain for mark in (first, second)]
     spread = nan
-    if first is not None and second is not None and None not in gains:
+    if first is not None and second is not None and None not in gains and not (first.varies or second.varies):
         spread = hypot(first.spread, second.spread)
     if isinstance(known.group, str):
         point = texts.RECORD_POINT.format(record=known.group, beta=known.x)

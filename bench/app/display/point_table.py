@@ -156,8 +156,10 @@ def _rows(
         own, its = value(stem), value(stem + _UNCERTAINTY)
         beside = next((stem + each for each in _PREDICTED if stem + each in named), "")
         predicted, spread = value(beside), value(beside + _UNCERTAINTY)
-        agrees = point.get(f"{stem}_agrees", point.get("agrees") if stem == "alpha_2" else None)
-        if agrees is None and isfinite(own - predicted) and isfinite(spread) and its > 0.0:
+        verdict = "agrees" if stem == "alpha_2" and "agrees" in point else f"{stem}_agrees"
+        agrees = point.get(verdict)
+        # a point without a verdict of its own on a quantity is not compared
+        if verdict not in point and isfinite(own - predicted) and isfinite(spread) and its > 0.0:
             agrees = abs(own - predicted) <= hypot(its, spread)
         if isfinite(own) or stem == "alpha_2":
             yield Measured(

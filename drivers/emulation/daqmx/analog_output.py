@@ -153,9 +153,10 @@ class AnalogOutput:
 
     def end(self) -> None:
         if self._playing and self._generation is not None:
-            self._ran_dry = self._generation.dry(self._instant.now)
-            for channel in self.outputs:
-                channel.terminal.freeze()
+            with self._instant.next() as tick:
+                self._ran_dry = self._generation.dry(tick - 1)
+                for channel in self.outputs:
+                    channel.terminal.freeze()
         self._playing = False
         self._generation = None
         self._run += 1

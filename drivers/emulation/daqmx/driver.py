@@ -133,30 +133,32 @@ class Driver:
     def reset_device(self, device: DeviceModel) -> None:
         """Abort the device's tasks, set its outputs to 0 V and its lines low. The aborted tasks are not removed."""
         with self.changed:
-            for name in {device.name, *device.modules}:
-                part = self.catalogue.device(name)
-                tasks = [task for task in self._tasks.values() if task.job and part.name in task.job.devices]
-                # an output goes from what it plays to 0 V at one tick, however long the other tasks take to end
-                with self.instant.next():
-                    for task in tasks:
-                        if isinstance(task.job, AnalogOutput):
-                            self._end(task)
+            parts = [self.catalogue.device(name) for name in {device.name, *device.modules}]
+            names = {part.name for part in parts}
+            tasks = [task for task in self._tasks.values() if task.job and not names.isdisjoint(task.job.devices)]
+            # the outputs go from what they play to 0 V at one tick, however long the other tasks take to end
+            with self.instant.next():
+                for task in tasks:
+                    if isinstance(task.job, AnalogOutput):
+                        self._end(task)
+                for part in parts:
                     for output in part.output_names:
                         self.terminals[output].hold(0.0)
-                for task in tasks:
-                    self._end(task)
-                    if isinstance(task.job, Watchdog):
-                        task.job.disarm()
+            for task in tasks:
+                self._end(task)
+                if isinstance(task.job, Watchdog):
+                    task.job.disarm()
+            for part in parts:
                 self.lines.reset(part.name, part.line_names)
             self._expired.discard(device.name)
 
     def reset(self) -> None:
         """Clear all tasks, and set every device to its state at power-up."""
         with self.changed:
-            for task in tuple(self._tasks.values()):
-                self.clear(task)
             for device in self.catalogue.devices:
                 self.reset_device(device)
+            for task in tuple(self._tasks.values()):
+                self.clear(task)
 
     def _fire(self, task: Task, job: Job) -> None:
         with self.instant.next() as tick:

@@ -24,10 +24,12 @@ def test_the_range_is_that_of_the_drawn_specimens() -> None:
         long_term(branch, known, Shaker(), 5, cycles=400, members=4)
         for known in (exact, SpecimenKnowledge(stiffness=0.005, damping=0.05, restitution=0.002, spring=0.005))
     )
-    assert certain.low == certain.high == pytest.approx(certain.gains.max(), rel=1e-12)
+    assert certain.low == certain.high == pytest.approx(certain.greatest, rel=1e-12)
     assert certain.falls == 0.0
     assert drawn.low < drawn.high
     assert np.array_equal(drawn.gains, certain.gains)
+    assert certain.greatest == certain.gains.max()
+    assert certain.least <= certain.gains.min()
 
 
 def test_the_command_lists_both_kinds_of_motion(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -51,6 +51,21 @@ def test_a_nominal_value_is_compared_and_the_verdict_follows_both_uncertainties(
     assert good.cells[4] == "+0.002 (+0.2 %)"
 
 
+def test_a_point_without_a_verdict_of_its_own_has_none() -> None:
+    columns = _columns(
+        omega_rad_s=("rad/s", "frequency"),
+        alpha_2=("1", "gain"),
+        alpha_2_uncertainty=("1", "expanded uncertainty"),
+        alpha_2_predicted=("1", "predicted gain"),
+        alpha_2_predicted_uncertainty=("1", "its expanded uncertainty"),
+        agrees=("", "whether both agree"),
+    )
+    modulated = {"omega_rad_s": 15.0, "alpha_2": 0.86, "alpha_2_uncertainty": 0.004, "alpha_2_predicted": 0.093,
+                 "alpha_2_predicted_uncertainty": 0.03, "agrees": None}  # fmt: skip
+    (row,) = rows_of(columns, [modulated])
+    assert row.agrees is None
+
+
 def test_a_line_of_the_loop_check_has_its_own_unit() -> None:
     columns = _columns(
         subject=("", "channel"), what=("", "measured property"), verdict=("", "whether it passed"), unit=("", "unit"),

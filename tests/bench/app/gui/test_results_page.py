@@ -70,6 +70,10 @@ def test_differences_are_set_against_both_uncertainties() -> None:
     assert one.score == pytest.approx(2.4)
     assert (fallen.reference, fallen.other, isnan(fallen.value), isnan(fallen.score)) == (None, None, True, True)
     assert (alone.reference, alone.other, isnan(alone.uncertainty)) == (None, 0.31, True)
+    modulated = [point(15.0, 0.86, 0.004).model_copy(update={"status": PointStatus.MODULATED}).model_dump()]
+    (free,) = compare(modulated, [modulated[0] | {"alpha_2": 0.89}])
+    # how much the largest drift varies from test to test is not stated
+    assert (free.value, isnan(free.score)) == (pytest.approx(0.03), True)
     records = [{"record": "Kobe", "beta": b, "alpha_2": a, "alpha_2_uncertainty": nan} for b, a in ((0.4, 0.8),)]
     assert compare(records, records)[0].point == "Kobe, β = 0.4"
 
