@@ -79,6 +79,9 @@ def start_processes(folder: Path, count: int) -> None:
         assert done.returncode == 0, done.stderr
         return time.monotonic() - begun
 
+    # other parts leave files in the folder as well
+    folder = folder / "processes"
+    folder.mkdir()
     with ThreadPoolExecutor(2) as pool:
         times = list(pool.map(run, range(count)))
     files = sorted(folder.rglob("campaign.h5"))
