@@ -30,6 +30,7 @@ RANGE = (0.025, 0.975)
 CYCLES, MEMBERS = 1500, 16
 
 PEAKS = "gain of the largest drift within one period, over all positions of the period"
+"""Beginning of the descriptions of least, mean and greatest peak."""
 
 
 @dataclass(frozen=True, eq=False)
