@@ -27,6 +27,7 @@ class Measured:
 
     low, high : bounds of the predicted interval, shown after the predicted value.
     agrees : whether measurement and prediction agree; None without a comparison.
+    compared : False if the prediction is only for information: that of an orbit on which the motion is not.
     status : status of the point.
     field : name of the quantity in the data of the point.
     """
@@ -43,14 +44,20 @@ class Measured:
     agrees: bool | None = None
     status: str = ""
     field: str = ""
+    compared: bool = True
+
+    @property
+    def off(self) -> float:
+        """Measured minus predicted value; NaN if they are not compared."""
+        return self.value - self.predicted if self.compared else nan
 
     @property
     def score(self) -> float:
         """Normalised error E_n: (measured - predicted), divided by the root sum of squares of the expanded
-        uncertainties of both. NaN if any of these is missing.
+        uncertainties of both. NaN if any of these is missing, or if they are not compared.
         """
         combined = hypot(self.uncertainty, self.predicted_uncertainty)
-        return (self.value - self.predicted) / combined if combined > 0.0 else nan
+        return self.off / combined if combined > 0.0 else nan
 
     @property
     def sentence(self) -> str:
@@ -59,7 +66,7 @@ class Measured:
         words = [f"{name} {value}"]
         if isfinite(self.predicted):
             words.append(f"{texts.PREDICTED} {predicted}")
-            if self.agrees is None:
+            if self.agrees is None and self.compared:
                 words.append(texts.DIFFERENCE.format(off=off))
         if verdict != ABSENT:
             words.append(verdict)
@@ -72,7 +79,7 @@ class Measured:
         predicted = measurement(factor * self.predicted, factor * self.predicted_uncertainty, unit)
         if isfinite(self.low) and isfinite(self.high):
             predicted = texts.INTERVAL.format(value=predicted, low=factor * self.low, high=factor * self.high)
-        off = self.value - self.predicted
+        off = self.off
         share = f" ({100.0 * off / self.predicted:+z.1f} %)" if isfinite(off) and self.predicted else ""
         return (
             self.point,
@@ -175,6 +182,7 @@ def _rows(
                 None if agrees is None else bool(agrees),
                 status,
                 name,
+                compared=verdict not in point or agrees is not None,
             )
 
 

@@ -1,10 +1,12 @@
 """Quantities of any protocol have names, units and verdicts in its declared fields."""
 
 import re
+from math import isnan
 
 import numpy as np
 
 from bench.app.display.point_table import every_field, rows_of
+from bench.app.formatting import ABSENT
 from bench.datafile.tables import Column
 from protocols.free_rocking.protocol import PROTOCOL as FREE_ROCKING
 
@@ -64,6 +66,9 @@ def test_a_point_without_a_verdict_of_its_own_has_none() -> None:
                  "alpha_2_predicted_uncertainty": 0.03, "agrees": None}  # fmt: skip
     (row,) = rows_of(columns, [modulated])
     assert row.agrees is None
+    # the prediction is that of an orbit on which the motion is not
+    assert (row.cells[3], row.cells[4], isnan(row.score)) == ("0.093 ± 0.030", ABSENT, True)
+    assert "+" not in row.sentence
 
 
 def test_a_line_of_the_loop_check_has_its_own_unit() -> None:
