@@ -101,6 +101,7 @@ def largest_within(values: Array, length: int) -> Array:
     with three comparisons per value (van Herk, Pattern Recognition Letters 13 (1992) 517).
 
     The values are split into blocks of the window's length: a window is the end of one block and the start of the next.
+    `scipy.ndimage.maximum_filter1d` does the same, but its import takes up to a second, while a table is driven.
     """
     blocks = np.full((-(-values.size // length), length), -np.inf)
     blocks.ravel()[: values.size] = values

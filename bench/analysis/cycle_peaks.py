@@ -107,7 +107,8 @@ def _half(length: int) -> int:
 
 def _smoothed(traces: Array, half: int) -> tuple[Array, float]:
     """Values of parabolas fitted to `half` samples on both sides of each sample, shape (n, k), and the standard
-    uncertainty of the first trace due to noise.
+    uncertainty of the first trace due to noise. The values are those of `scipy.signal.savgol_filter`, which would be
+    imported while the table is driven.
     """
     matrix = parabola(2 * half + 1)
     middle = np.stack([np.convolve(trace, matrix[0][::-1], mode="valid") for trace in traces.T], axis=1)

@@ -14,10 +14,10 @@ from bench.analysis.sensor_accuracy import Draws, PeakReadings, SensorUncertaint
 from bench.analysis.sensor_accuracy import SensorAccuracy as SensorAccuracy
 from bench.analysis.signals import ACCELERATION, DRIFT, LASER_1, LASER_2, U1
 from bench.analysis.uncertainty import COVERAGE as COVERAGE
-from bench.analysis.uncertainty import Budget, combined_freedom
+from bench.analysis.uncertainty import NOISE, Budget, combined_freedom
 
-SCATTER, NOISE = "scatter of the cycles", "noise of the peaks"
-"""Names of the contributions of the cycles to the budgets."""
+SCATTER = "scatter of the cycles"
+"""Name of the contribution of the scatter to the budgets."""
 
 DRAWS, SEED = 4000, 1
 """Number of Monte Carlo draws of the sensors' errors; with this number, the expanded uncertainty has a statistical

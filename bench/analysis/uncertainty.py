@@ -19,6 +19,9 @@ from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 
+NOISE = "noise of the peaks"
+"""Name of the contribution of noise to the budget of a peak that is taken from samples."""
+
 _LEVEL = 0.975
 _STEPS, _CLOSE = 200, 1e-10
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from bench.analysis.linearity import Checks
 from bench.analysis.sensor_accuracy import Draws, PeakReadings, SensorUncertainty
-from bench.analysis.uncertainty import COVERAGE, Budget
+from bench.analysis.uncertainty import COVERAGE, NOISE, Budget
 from bench.config.model import BenchConfiguration
 from protocols.earthquake.draws import Predicted, predict_draws
 from protocols.earthquake.measurement import Observed, PeakSeen
@@ -189,9 +189,6 @@ def _known(value: float) -> float | None:
 
 
 Array = NDArray[np.float64]
-
-NOISE = "noise of the peaks"
-"""Name of the contribution that is independent in the two tests."""
 
 CHOICE = "choice of the largest peak"
 """Name of the contribution due to other peaks of almost the same size."""

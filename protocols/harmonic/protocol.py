@@ -87,11 +87,7 @@ class HarmonicPoint(Parameters):
     alpha_2_least_uncertainty: float | None = quantity(
         None, "1", "expanded uncertainty of alpha_2_least (k = 2), as a property of the measured cycles"
     )
-    alpha_2_greatest: float | None = quantity(
-        None,
-        "1",
-        "gain of the largest drift of an unsteady free motion",
-    )
+    alpha_2_greatest: float | None = quantity(None, "1", "gain of the largest drift of an unsteady free motion")
     alpha_2_greatest_uncertainty: float | None = quantity(
         None, "1", "expanded uncertainty of alpha_2_greatest (k = 2), as a property of the measured cycles"
     )

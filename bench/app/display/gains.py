@@ -63,9 +63,7 @@ class Mark:
 
     @property
     def varies(self) -> bool:
-        """Whether the motion was modulated: the gain is then that of its largest drift, which the next
-        test need not repeat.
-        """
+        """Whether the motion was modulated: the gain is that of its largest drift, which no other test must repeat."""
         return self.status == "modulated"
 
     @property

@@ -1,9 +1,10 @@
-"""Peaks of single cycles: their noise, and the gains made of them."""
+"""Peaks of an unsteady motion: their noise, missing samples, and few samples per cycle."""
 
 import numpy as np
 import pytest
+from scipy.signal import savgol_filter
 
-from bench.analysis.cycle_peaks import cycle_peaks
+from bench.analysis.cycle_peaks import _smoothed, cycle_peaks  # pyright: ignore[reportPrivateUsage]
 from bench.analysis.cycles import Cycle, CycleAnalyser, fit_cycle
 from bench.analysis.signals import DRIFT, LASER_1, LASER_2, U1
 
@@ -50,6 +51,12 @@ def test_the_noise_of_the_smallest_and_the_largest_of_many_peaks_is_stated() -> 
         found = cycle_peaks(CycleAnalyser(2.0 * np.pi, SAMPLES, 0).push(values), 15.0)
         errors.append([(peak.drift - PEAK) / peak.noise for peak in (found.least, found.mean, found.greatest)])
     assert (np.sqrt(np.mean(np.square(errors), axis=0)) < 1.5).all()
+
+
+def test_the_smoothed_drift_is_that_of_an_independent_filter() -> None:
+    values = np.random.default_rng(1).standard_normal((200, 3))
+    smooth, _ = _smoothed(values, 6)
+    assert smooth == pytest.approx(savgol_filter(values, 13, 2, axis=0, mode="interp"), abs=1e-12)
 
 
 def test_missing_samples_do_not_move_the_peaks() -> None:
