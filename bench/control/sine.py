@@ -152,6 +152,10 @@ class SineControl:
         """Estimates of the gains g_k, shape (highest,)."""
         return self._gains
 
+    def take_full_steps(self) -> None:
+        """Remove the fraction `GAIN` of an error again, since the motion has become steady."""
+        self._steps = 0
+
     def next(self, response: SineResponse) -> tuple[complex, ...] | None:
         """Shares to play next, or None if the response is within the tolerance."""
         self._learn(response)

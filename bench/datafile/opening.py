@@ -63,7 +63,7 @@ WORDING = 10
 same version.
 """
 
-INTERVALS = 6
+INTERVALS = 7
 """Version of the evaluation of uncertainties, and of the least and mean peak of an unsteady motion. Replay compares
 them only with those of a file of the same version.
 """

@@ -7,6 +7,7 @@ from math import nan
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.analysis.uncertainty import next_value
 from bench.datafile.tables import Column, Table
 from bench.prediction.requests import AttractorRequest
 from bench.prediction.steady import predict_spectra
@@ -24,9 +25,6 @@ from sim.table_orbit import table_orbit
 SEED = 1
 """Seed of the drawn specimens, fixed so that predictions are reproducible."""
 
-RANGE = (0.025, 0.975)
-"""Quantiles that enclose 95 % of the greatest peaks of the drawn specimens."""
-
 CYCLES, MEMBERS = 1500, 16
 
 PEAKS = "gain of the largest drift within one period, over all positions of the period"
@@ -41,10 +39,10 @@ class LongTerm:
     If the orbit on the table is `stable`, the motion is the orbit. The motion repeats after `repeats` cycles; 0 if it
     does not repeat, or if the block falls. `gains`, shape (n,), are the gains of the peaks of the last cycles, without
     entries if the block falls, which happens after `fallen` cycles. `least`, `mean` and `greatest` are the gains of the
-    largest drift within a period that slides over these cycles, NaN if the block falls. `low` and `high` enclose the
-    gains of the greatest peaks for 95 % of the drawn specimens whose block does not fall, and `falls` is the fraction
-    of specimens whose block falls; all three are NaN without drawn specimens, `low` and `high` also if every block
-    falls.
+    largest drift within a period that slides over these cycles, NaN if the block falls. `low` and `high`, shape (3,),
+    are the ends of the intervals that contain these three gains of a further specimen, whose block does not fall, with
+    95 %; NaN if the blocks of fewer than two drawn specimens do not fall. `falls` is the fraction of drawn specimens
+    whose block falls, NaN without any.
     """
 
     omega: float
@@ -56,9 +54,9 @@ class LongTerm:
     mean: float
     greatest: float
     repeats: int
+    low: NDArray[np.float64]
+    high: NDArray[np.float64]
     fallen: int | None = None
-    low: float = nan
-    high: float = nan
     falls: float = nan
 
 
@@ -80,8 +78,8 @@ def long_term(
     fixed = branch.orbit
     orbit, beta = table_orbit(fixed, shaker, harmonics), fixed.specimen.label or 0.0
     if orbit.stable:
-        gain = branch.alpha_2
-        return LongTerm(fixed.omega, beta, gain, True, np.array([gain]), gain, gain, gain, repeats=1)
+        gain, absent = branch.alpha_2, np.full(3, nan)
+        return LongTerm(fixed.omega, beta, gain, True, np.array([gain]), gain, gain, gain, 1, absent, absent)
 
     def motions(specimen: Specimen) -> tuple[float, Attractor]:
         bare = steady_peaks(specimen.bare(), fixed.omega, fixed.amplitude).drift
@@ -89,9 +87,9 @@ def long_term(
 
     drawn = known.draws(fixed.specimen, members, np.random.default_rng(SEED))
     (bare, motion), *others = in_threads(motions, [fixed.specimen, *drawn])
-    greatest = [other.within[2] / each for each, other in others if other.fallen is None]
-    low, high = np.quantile(greatest, RANGE).tolist() if greatest else (nan, nan)
-    falls = 1.0 - len(greatest) / len(others) if others else nan
+    kept = [np.array(other.within) / each for each, other in others if other.fallen is None]
+    low, high = next_value(np.reshape(kept, (-1, 3)))
+    falls = 1.0 - len(kept) / len(others) if others else nan
     least, mean, most = (each / bare for each in motion.within)
     return LongTerm(
         fixed.omega,
@@ -103,9 +101,9 @@ def long_term(
         mean=mean,
         greatest=most,
         repeats=motion.repeats,
-        fallen=motion.fallen,
-        low=low,
+        low=np.maximum(low, 0.0),
         high=high,
+        fallen=motion.fallen,
         falls=falls,
     )
 
@@ -149,11 +147,17 @@ def attractors_table(found: Sequence[LongTerm]) -> Table:
         "alpha_2_least": numbers([each.least for each in found], "1", f"{PEAKS}: smallest"),
         "alpha_2_mean": numbers([each.mean for each in found], "1", f"{PEAKS}: mean"),
         "alpha_2_greatest": numbers([each.greatest for each in found], "1", f"{PEAKS}: largest"),
-        "greatest_low": numbers(
-            [each.low for each in found], "1", "lower end of the 95 % range of alpha_2_greatest over the specimens"
-        ),
-        "greatest_high": numbers(
-            [each.high for each in found], "1", "upper end of the 95 % range of alpha_2_greatest over the specimens"
-        ),
+        **{
+            f"{name}_{end}": numbers(
+                [values[k] for values in ends],
+                "1",
+                f"{side} end of the interval that contains alpha_2_{name} of a further specimen with 95 %",
+            )
+            for k, name in enumerate(("least", "mean", "greatest"))
+            for end, side, ends in (
+                ("low", "lower", [each.low for each in found]),
+                ("high", "upper", [each.high for each in found]),
+            )
+        },
         "falls": numbers([each.falls for each in found], "1", "fraction of the drawn specimens whose block falls"),
     }

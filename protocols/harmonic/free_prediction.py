@@ -12,7 +12,9 @@ from sim.specimen import Specimen
 from sim.steady import NoOrbit
 
 MEMBERS = 8
-"""Number of specimens drawn, within the uncertainty, for the range of the greatest peak."""
+"""Number of specimens drawn, within the uncertainty, for the ranges of the peaks."""
+
+PEAKS = ("least", "mean", "greatest")
 
 
 def with_free_prediction(
@@ -23,28 +25,25 @@ def with_free_prediction(
     Other points are unchanged. Nothing is added without a model of the table, or where disturbances of the orbit decay,
     since the free motion then tends to the orbit.
     """
-    greatest, doubt, multiplier = point.alpha_2_greatest, point.alpha_2_greatest_uncertainty, point.table_multiplier
-    if greatest is None or doubt is None or multiplier is None or multiplier <= 1.0:
+    multiplier = point.table_multiplier
+    if point.alpha_2_greatest is None or multiplier is None or multiplier <= 1.0:
         return point
     found = _predicted(specimen, point.omega_rad_s, amplitude, configuration, harmonics)
     if found is None:
         return point
-    agrees, low, high = None, found["low"], found["high"]
-    # the prediction is for the requested amplitude, to which the peaks are assumed to be proportional
-    doubt = hypot(doubt, 2.0 * configuration.sensors.table_scale * greatest)
-    if low is not None:
-        agrees = low - doubt <= greatest <= high + doubt
-    fields: dict[str, Any] = {
-        "alpha_2_least_predicted": found["least"],
-        "alpha_2_mean_predicted": found["mean"],
-        "alpha_2_greatest_predicted": found["greatest"],
-        "alpha_2_greatest_low": low,
-        "alpha_2_greatest_high": high,
-        "repeats_predicted": found["repeats"] or None,
-        "falls_predicted": found["falls"],
-        "free_agrees": agrees,
-    }
-    return point.model_copy(update=fields | {"reason": "; ".join(filter(None, (point.reason, _remark(found, agrees))))})
+    fields: dict[str, Any] = {"repeats_predicted": found["repeats"] or None, "falls_predicted": found["falls"]}
+    outside = list[str]()
+    for name, low, high in zip(PEAKS, found["low"], found["high"], strict=True):
+        fields[f"alpha_2_{name}_predicted"] = found[name]
+        fields[f"alpha_2_{name}_low"], fields[f"alpha_2_{name}_high"] = low, high
+        measured, uncertainty = (getattr(point, f"alpha_2_{name}{end}") for end in ("", "_uncertainty"))
+        # the prediction is for the requested amplitude, to which the peaks are assumed to be proportional
+        doubt = hypot(uncertainty, 2.0 * configuration.sensors.table_scale * measured)
+        if low is not None and not low - doubt <= measured <= high + doubt:
+            outside.append(name)
+    fields["free_agrees"] = None if found["low"][0] is None else not outside
+    reason = "; ".join(filter(None, (point.reason, _remark(found, outside))))
+    return point.model_copy(update=fields | {"reason": reason})
 
 
 def _predicted(
@@ -79,17 +78,18 @@ def _numbers(motion: LongTerm) -> dict[str, Any]:
         "mean": known(motion.mean),
         "greatest": known(motion.greatest),
         "repeats": motion.repeats,
-        "low": known(motion.low),
-        "high": known(motion.high),
+        "low": [known(value) for value in motion.low.tolist()],
+        "high": [known(value) for value in motion.high.tolist()],
         "falls": known(motion.falls),
     }
 
 
-def _remark(found: dict[str, Any], agrees: bool | None) -> str:
+def _remark(found: dict[str, Any], outside: list[str]) -> str:
     if found["greatest"] is None:
         return "the model's free motion ends with a fall of the block"
     repeats = f"repeats every {found['repeats']} cycles" if found["repeats"] else "does not repeat"
     text = f"the model's free motion {repeats}, with peaks up to alpha_2 = {found['greatest']:.3f}"
-    if found["low"] is not None:
-        text += f" ({found['low']:.3f} to {found['high']:.3f} for 95 % of the drawn specimens)"
-    return text if agrees is not False else f"{text}; the measured peak is outside this range"
+    low, high = found["low"][-1], found["high"][-1]
+    if low is not None:
+        text += f" ({low:.3f} to {high:.3f} for 95 % of the specimens within the uncertainty)"
+    return f"{text}; outside the predicted range: measured {' and '.join(outside)} peak" if outside else text

@@ -287,7 +287,8 @@ class HarmonicPlan:
         sine = Sine(omega, self._amplitude, calibration)
         report = self._report(omega, specimen)
         frame = linear_frame(self._configuration) if specimen is None else None
-        return settle_and_measure(sine, self._parameters, self._configuration.analysis, report, frame)
+        free_cycles = 0 if specimen is None else self._parameters.free_cycles or 0
+        return settle_and_measure(sine, self._parameters, self._configuration.analysis, report, frame, free_cycles)
 
     def _report(self, omega: float, specimen: Specimen | None) -> Report:
         """Callback that publishes the running gain."""

@@ -1,7 +1,7 @@
 """Harmonic protocol: comparison of measured and predicted gain in steady sine tests."""
 
 from enum import StrEnum
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, field_validator
 
@@ -45,6 +45,14 @@ class HarmonicParameters(SineParameters, HarmonicPoints):
         "whether the stabiliser of a held motion uses a map identified in the run instead of the model of specimen and "
         "table",
     )
+    free_cycles: int | None = quantity(
+        96,
+        "1",
+        "number of cycles before the settle limit in which the drive of a motion that is not steady is constant, at "
+        "most half of the limit; if absent, it is corrected until the limit",
+        ge=24,
+        le=1000,
+    )
 
 
 class PointStatus(StrEnum):
@@ -55,6 +63,14 @@ class PointStatus(StrEnum):
     MODULATED = "modulated"
     RESTING = "resting"
     OVERTURNED = "overturned"
+
+
+def _end_of_range(side: str, name: str) -> Any:
+    return quantity(
+        None,
+        "1",
+        f"{side} end of the range of alpha_2_{name}_predicted for 95 % of the specimens within the uncertainty",
+    )
 
 
 class HarmonicPoint(Parameters):
@@ -111,16 +127,12 @@ class HarmonicPoint(Parameters):
         "predicted gain of the largest peak of the long-term free motion, where the orbit is unstable on the simulated "
         "table; absent if the model's block falls",
     )
-    alpha_2_greatest_low: float | None = quantity(
-        None,
-        "1",
-        "lower end of the range of alpha_2_greatest_predicted for 95 % of the specimens within the uncertainty",
-    )
-    alpha_2_greatest_high: float | None = quantity(
-        None,
-        "1",
-        "upper end of the range of alpha_2_greatest_predicted for 95 % of the specimens within the uncertainty",
-    )
+    alpha_2_least_low: float | None = _end_of_range("lower", "least")
+    alpha_2_least_high: float | None = _end_of_range("upper", "least")
+    alpha_2_mean_low: float | None = _end_of_range("lower", "mean")
+    alpha_2_mean_high: float | None = _end_of_range("upper", "mean")
+    alpha_2_greatest_low: float | None = _end_of_range("lower", "greatest")
+    alpha_2_greatest_high: float | None = _end_of_range("upper", "greatest")
     repeats_predicted: int | None = quantity(
         None, "1", "predicted number of cycles after which the free motion repeats; absent if it does not repeat"
     )
@@ -128,7 +140,9 @@ class HarmonicPoint(Parameters):
         None, "1", "fraction of the specimens drawn within the uncertainty whose block falls in the free motion"
     )
     free_agrees: bool | None = quantity(
-        None, "1", "whether alpha_2_greatest is within the predicted range, widened by the measurement uncertainty"
+        None,
+        "1",
+        "whether least, mean and greatest peak are within the predicted ranges, each widened by its uncertainty",
     )
     alpha_2_orbit: float | None = quantity(
         None, "1", "gain of the orbit about which an unsteady motion revolves, from the mean cycle of the motion"

@@ -6,8 +6,8 @@ Each run is `rockbench run harmonic --no-hold` at one point on the simulated ben
 sensors drawn as in `tests.benchmarks.hold`. The true gains are those of the largest true drift within a period that
 slides over the cycles that the bench evaluated: least, mean and greatest, over the mean of the bare frame in its
 measured cycles.
-Printed for each run: error in per cent and in expanded uncertainties. In the end, for each quantity: rms of e, and the
-share of the intervals that contain the truth.
+Printed for each run: error in per cent and in expanded uncertainties. In the end, for each quantity: rms of e, the
+share of the intervals that contain the truth, and the share of the predicted ranges that contain it.
 """
 
 import argparse
@@ -121,11 +121,15 @@ def study() -> None:
     for text in asked.points:
         omega, beta = map(float, text.split(":"))
         found: dict[str, list[Estimate]] = {name: [] for name in NAMES}
+        inside: dict[str, list[bool]] = {name: [] for name in NAMES}
         for seed in range(asked.first, asked.first + asked.seeds):
             point, estimates = free_peaks(omega, beta, seed, asked.share, asked.options)
             row = f"{omega:g} {beta:g} seed {seed}: {point['status']}, {point.get('cycles_measured')} cycles"
             for name, each in estimates.items():
                 found[name].append(each)
+                low, high = (point[f"alpha_2_{name}_{end}"] for end in ("low", "high"))
+                if low is not None:
+                    inside[name].append(low <= each.truth <= high)
                 error = 100.0 * (each.value / each.truth - 1.0)
                 row += f", {name} {each.value:.4f} {error:+.2f} % {0.5 * each.e:+.2f} U"
             print(row, flush=True)
@@ -135,7 +139,8 @@ def study() -> None:
                 print(
                     f"{omega:g} {beta:g} {name}: {stated.n} of {asked.seeds}, worst error {100 * worst:.2f} %, "
                     f"U {100 * stated.relative:.2f} %, rms of e {stated.rms:.2f}, mean {stated.mean:+.2f}, covered "
-                    f"{100 * stated.covered:.0f} % ({100 * stated.low:.0f} to {100 * stated.high:.0f})",
+                    f"{100 * stated.covered:.0f} % ({100 * stated.low:.0f} to {100 * stated.high:.0f}), "
+                    f"in {sum(inside[name])} of {len(inside[name])} predicted ranges",
                     flush=True,
                 )
 

@@ -106,11 +106,13 @@ def settle_and_measure(
     accuracy: SensorAccuracy,
     report: Report,
     frame: LinearFrame | None = None,
+    free_cycles: int = 0,
 ) -> Generator[Step, Outcome, Settled | Fallen]:
     """Hold the table at `sine` until every signal is steady, then measure.
 
-    A motion that is not steady within the settle limit is measured as modulated. In a test of the bare frame, its model
-    `frame` is used to check the lasers.
+    A motion that is not steady within the settle limit is measured as modulated. The drive of such a motion is constant
+    for the last `free_cycles` cycles before the limit, but at most for half of the limit. In a test of the bare frame,
+    its model `frame` is used to check the lasers.
     """
     detector = SteadyDetector(parameters.settle_tolerance, JUDGED, LASERS, sine.omega * accuracy.laser_timing)
     control = SineControl(
@@ -126,6 +128,8 @@ def settle_and_measure(
     recent: deque[Cycle] = deque(maxlen=WINDOW)
     constant: deque[Cycle] = deque(maxlen=KEPT)
     measured = max(parameters.measured_cycles, 2 * WINDOW)
+    limit = parameters.settle_limit
+    last_correction = max(limit - free_cycles * tau / sine.omega, 0.5 * limit)
     waited, over = 0.0, False
     while True:
         ready = over or (waited >= SHORTEST and detector.judge().steady)
@@ -160,9 +164,13 @@ def settle_and_measure(
                 )
         recent.extend(cycles)
         yield from report(list(recent))
-        over = waited >= parameters.settle_limit
+        over = waited >= limit
+        if waited >= last_correction:
+            if over or not detector.judge().steady:
+                continue
+            control.take_full_steps()
         shares = control.next(SineResponse.of(cycles[TRANSIENT:], sine, turn))
-        if shares is not None and not over:
+        if shares is not None:
             yield SetHarmonics(shares)
             drive = shares
             updates += 1

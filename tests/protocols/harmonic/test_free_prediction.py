@@ -20,6 +20,10 @@ def free(greatest: float, multiplier: float | None = 1.046) -> HarmonicPoint:
         layer="rocking",
         alpha_2=greatest,
         alpha_2_uncertainty=0.01 * greatest,
+        alpha_2_least=0.48,
+        alpha_2_least_uncertainty=0.005,
+        alpha_2_mean=0.7,
+        alpha_2_mean_uncertainty=0.007,
         alpha_2_greatest=greatest,
         alpha_2_greatest_uncertainty=0.01 * greatest,
         table_multiplier=multiplier,
@@ -27,8 +31,8 @@ def free(greatest: float, multiplier: float | None = 1.046) -> HarmonicPoint:
     )
 
 
-@pytest.mark.parametrize(("greatest", "agrees"), [(0.86, True), (2.0, False)])
-def test_the_greatest_peak_is_compared_with_the_range_of_the_specimens(
+@pytest.mark.parametrize(("greatest", "agrees"), [(0.86, True), (4.0, False)])
+def test_the_peaks_are_compared_with_the_ranges_of_the_specimens(
     greatest: float, agrees: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(free_prediction, "MEMBERS", 3)
@@ -38,7 +42,10 @@ def test_the_greatest_peak_is_compared_with_the_range_of_the_specimens(
     assert found.repeats_predicted == 9
     assert found.free_agrees is agrees
     assert found.reason.startswith("not steady; the model's free motion repeats every 9 cycles")
-    assert found.reason.endswith("the measured peak is outside this range") is not agrees
+    assert found.reason.endswith("outside the predicted range: measured greatest peak") is not agrees
+    for name in ("least", "mean", "greatest"):
+        low, predicted, high = (getattr(found, f"alpha_2_{name}_{end}") for end in ("low", "predicted", "high"))
+        assert low < predicted < high
 
 
 @pytest.mark.parametrize("multiplier", [None, 0.999])
