@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.analysis.cycle_peaks import CyclePeaks, cycle_peaks
 from bench.analysis.cycles import Cycle
 from bench.analysis.gain import SteadyPeak, steady_peak
 from bench.analysis.signals import DRIFT, LASER_1, LASER_2, U1
+from bench.analysis.unsteady_peaks import UnsteadyPeaks, unsteady_peaks
 from sim.attractor import LONGEST_PERIOD, period_of
 
 CYCLES = 4 * LONGEST_PERIOD
@@ -61,11 +61,11 @@ class Rate:
 
 @dataclass(frozen=True)
 class FreeMotion:
-    """Peaks of the drift, see `bench.analysis.cycle_peaks`. `repeats` is the number of cycles after which the motion
+    """Peaks of the drift, see `bench.analysis.unsteady_peaks`. `repeats` is the number of cycles after which the motion
     repeats, 0 if it does not; `rate` is None if the changes are too few, too noisy or not those of a linear system.
     """
 
-    peaks: CyclePeaks
+    peaks: UnsteadyPeaks
     repeats: int
     rate: Rate | None
 
@@ -76,7 +76,7 @@ def free_motion(cycles: Sequence[Cycle], omega: float) -> FreeMotion:
     """
     last = cycles[-CYCLES:]
     return FreeMotion(
-        peaks=cycle_peaks(last, omega),
+        peaks=unsteady_peaks(last, omega),
         repeats=period_of(np.array([cycle.extreme[[U1, DRIFT]] for cycle in last])),
         rate=rate_of(cycles),
     )

@@ -6,12 +6,12 @@ from math import tau
 
 import numpy as np
 
-from bench.analysis.cycle_peaks import cycle_peaks
 from bench.analysis.cycles import Cycle, CycleAnalyser, mean_amplitude
 from bench.analysis.free_motion import CYCLES, KEPT, Rate, free_motion, orbit_peak
 from bench.analysis.gain import steady_peak
 from bench.analysis.signals import ACCELERATION, SIGNALS
 from bench.analysis.steady import SteadyDetector
+from bench.analysis.unsteady_peaks import unsteady_peaks
 from bench.config.model import BenchConfiguration
 from bench.control.oscillator import DriveCalibration
 from bench.control.sine import Sine, SineResponse
@@ -194,7 +194,7 @@ class HarmonicFollower:
         omega, used = series.sine.omega, series.recent[-self._cycles :]
         table = SineResponse.of(used, series.sine, series.turn or 1.0 + 0.0j)
         return Held(
-            peak=cycle_peaks(used, omega).greatest if self._settings.peak == "largest" else steady_peak(used, omega),
+            peak=unsteady_peaks(used, omega).greatest if self._settings.peak == "largest" else steady_peak(used, omega),
             amplitude_error=table.amplitude_error,
             phase_error=table.phase_error,
             control=point.control_share or 0.0,
@@ -223,7 +223,7 @@ class HarmonicFollower:
         frame = linear_frame(self._configuration) if series.beta is None else None
         before = preceding(constant, used) if steadiness.steady else ()
         return Settled(
-            steady_peak(used, omega, before=before, frame=frame) if mean else cycle_peaks(used, omega).greatest,
+            steady_peak(used, omega, before=before, frame=frame) if mean else unsteady_peaks(used, omega).greatest,
             steadiness,
             series.waited,
             table.amplitude_error,

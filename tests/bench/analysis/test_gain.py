@@ -9,13 +9,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bench.analysis.cycle_peaks import cycle_peaks
 from bench.analysis.cycles import Cycle, fit_cycle
 from bench.analysis.gain import DRAWS, SEED, SensorAccuracy, SteadyPeak, gain, steady_peak
 from bench.analysis.laser_calibration import LaserCalibration, LaserCurve
 from bench.analysis.running_gain import shared_draws
 from bench.analysis.sensor_accuracy import SCALES, Draws, PeakReadings, SensorUncertainty
 from bench.analysis.signals import ACCELERATION, DRIFT, LASER_2
+from bench.analysis.unsteady_peaks import unsteady_peaks
 from tests.made_cycles import pure_cycle
 
 EXACT = SensorAccuracy(laser_mismatch=0.0, laser_resolution=0.0, laser_timing=0.0, laser_linearity=0.0, table_scale=0.0)
@@ -114,7 +114,7 @@ def test_correlated_cycles_count_less() -> None:
 
 def test_an_unsteady_motion_counts_with_the_peaks_of_its_cycles() -> None:
     drifts = 1.0 + 0.3 * np.sin(np.arange(40))
-    peaks = cycle_peaks(_cycles(np.repeat(drifts, 4)), 1.0)
+    peaks = unsteady_peaks(_cycles(np.repeat(drifts, 4)), 1.0)
     assert peaks.least.drift == pytest.approx(drifts.min(), rel=1e-4)
     assert peaks.greatest.drift == pytest.approx(drifts.max(), rel=1e-4)
 

@@ -6,11 +6,11 @@ from math import hypot
 import numpy as np
 import pytest
 
-from bench.analysis.cycle_peaks import CyclePeaks
 from bench.analysis.free_motion import FreeMotion, Rate
 from bench.analysis.gain import SensorAccuracy, SteadyPeak
 from bench.analysis.sensor_accuracy import PeakReadings, SensorUncertainty
 from bench.analysis.steady import Steadiness
+from bench.analysis.unsteady_peaks import UnsteadyPeaks
 from protocols.common.sine.settling import Settled
 from protocols.harmonic.judgement import Conditions, judge
 from protocols.harmonic.protocol import HarmonicPoint, PointStatus
@@ -156,7 +156,7 @@ def test_the_orbit_about_which_a_motion_turns_is_compared_with_the_prediction(of
     least, mean, greatest = (_settled(ratio * peaks.drift, peaks.u1).peak for ratio in (0.95, 1.0, 1.05))
     turning = replace(
         _settled(1.05 * peaks.drift, peaks.u1, Steadiness(False, 0.1, 0.0, 0)),
-        motion=FreeMotion(CyclePeaks(least, mean, greatest), 0, Rate(0.999, 0.001, 2.7)),
+        motion=FreeMotion(UnsteadyPeaks(least, mean, greatest), 0, Rate(0.999, 0.001, 2.7)),
         orbit=_settled((1.0 + off) * peaks.drift, peaks.u1).peak,
     )
     point = judge(turning, conditions(SpecimenKnowledge()), 1)

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.signal import savgol_filter
 
-from bench.analysis.cycle_peaks import _smoothed, cycle_peaks  # pyright: ignore[reportPrivateUsage]
 from bench.analysis.cycles import Cycle, CycleAnalyser, fit_cycle
 from bench.analysis.signals import DRIFT, LASER_1, LASER_2, U1
+from bench.analysis.unsteady_peaks import _smoothed, unsteady_peaks  # pyright: ignore[reportPrivateUsage]
 
 SAMPLES, CYCLES = 840, 48
 PHASE = np.arange(SAMPLES) * (2.0 * np.pi / SAMPLES)
@@ -30,7 +30,7 @@ def noisy(noise: float, seed: int) -> Cycle:
 
 @pytest.mark.parametrize("noise", [2e-5, 1e-4])
 def test_the_noise_of_a_peak_is_stated(noise: float) -> None:
-    peaks = [cycle_peaks([noisy(noise, seed)], 15.0).greatest for seed in range(400)]
+    peaks = [unsteady_peaks([noisy(noise, seed)], 15.0).greatest for seed in range(400)]
     errors = np.array([peak.drift - PEAK for peak in peaks])
     stated = np.sqrt(np.mean([peak.noise**2 for peak in peaks]))
     # 400 values: the ratio of honest numbers is within 0.9 to 1.1 with a probability of 99.5 %
@@ -48,7 +48,7 @@ def test_the_noise_of_the_smallest_and_the_largest_of_many_peaks_is_stated() -> 
         noise = 1e-4 * np.random.default_rng(seed).standard_normal((2, drift.size))
         values[:, LASER_1], values[:, LASER_2] = 0.5 * drift + noise[0], 1.5 * drift + noise[1]
         values[:, DRIFT] = values[:, LASER_2] - values[:, LASER_1]
-        found = cycle_peaks(CycleAnalyser(2.0 * np.pi, SAMPLES, 0).push(values), 15.0)
+        found = unsteady_peaks(CycleAnalyser(2.0 * np.pi, SAMPLES, 0).push(values), 15.0)
         errors.append([(peak.drift - PEAK) / peak.noise for peak in (found.least, found.mean, found.greatest)])
     assert (np.sqrt(np.mean(np.square(errors), axis=0)) < 1.5).all()
 
@@ -68,7 +68,7 @@ def test_missing_samples_do_not_move_the_peaks() -> None:
     for start in range(100, len(whole), 2 * SAMPLES):
         missing[start : start + 15] = np.nan
     for values in (whole, missing):
-        found = cycle_peaks(CycleAnalyser(2.0 * np.pi, SAMPLES, 0).push(values), 15.0)
+        found = unsteady_peaks(CycleAnalyser(2.0 * np.pi, SAMPLES, 0).push(values), 15.0)
         for peak in (found.least, found.mean, found.greatest):
             assert peak.drift == pytest.approx(AMPLITUDE, rel=1e-4)
 
@@ -77,6 +77,6 @@ def test_missing_samples_do_not_move_the_peaks() -> None:
 def test_few_samples_per_cycle_are_enough(samples: int) -> None:
     values = np.zeros((12 * samples, 7))
     values[:, DRIFT] = np.sin(2.0 * np.pi / samples * np.arange(len(values)))
-    found = cycle_peaks(CycleAnalyser(2.0 * np.pi, samples, 0).push(values), 15.0)
+    found = unsteady_peaks(CycleAnalyser(2.0 * np.pi, samples, 0).push(values), 15.0)
     assert found.greatest.drift == pytest.approx(1.0, abs=0.02)
     assert found.greatest.noise < 0.02

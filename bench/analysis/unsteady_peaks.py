@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class CyclePeaks:
+class UnsteadyPeaks:
     """Largest drift within one period: smallest, mean and largest over all positions of the period."""
 
     least: SteadyPeak
@@ -39,7 +39,7 @@ class CyclePeaks:
     greatest: SteadyPeak
 
 
-def cycle_peaks(cycles: Sequence[Cycle], omega: float) -> CyclePeaks:
+def unsteady_peaks(cycles: Sequence[Cycle], omega: float) -> UnsteadyPeaks:
     """Peaks of consecutive cycles at `omega` [rad/s], relative to the storeys at rest."""
     windows = [_Windows.of(each) for each in _uninterrupted(cycles)]
     least = min(windows, key=lambda each: each.largest.min())
@@ -56,7 +56,7 @@ def cycle_peaks(cycles: Sequence[Cycle], omega: float) -> CyclePeaks:
     mean = float(np.concatenate([each.largest for each in windows]).mean())
     tops = [each.seen(k) for each in windows for k in range(0, each.largest.size, each.length)]
     chosen = noise * sqrt(1.0 + 2.0 * log(len(cycles)) / 3.0)
-    return CyclePeaks(
+    return UnsteadyPeaks(
         least=of(float(least.largest.min()), least.seen(int(least.largest.argmin())), chosen),
         mean=of(mean, np.mean([_turned(each) for each in tops], axis=0), noise),
         greatest=of(
