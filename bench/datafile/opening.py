@@ -64,8 +64,8 @@ same version.
 """
 
 INTERVALS = 7
-"""Version of the evaluation of uncertainties, and of the least and mean peak of an unsteady motion. Replay compares
-them only with those of a file of the same version.
+"""Version of the evaluation of uncertainties, of the least and mean peak of an unsteady motion, and of the predicted
+intervals of its peaks. Replay compares them only with those of a file of the same version.
 """
 
 ANALYSIS, ANALYSIS_VERSION = "rocking-bench analysis", 1

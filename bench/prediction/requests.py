@@ -162,7 +162,7 @@ class AttractorRequest(OnTableRequest, OrbitsRequest):
     members: int = quantity(
         16,
         "1",
-        "number of specimens drawn for the range of the greatest peak and the fraction of falls",
+        "number of specimens drawn for the ranges of the peaks and the fraction of falls",
         ge=0,
         le=10_000,
     )

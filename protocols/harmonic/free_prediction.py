@@ -85,11 +85,13 @@ def _numbers(motion: LongTerm) -> dict[str, Any]:
 
 
 def _remark(found: dict[str, Any], outside: list[str]) -> str:
+    names = " and ".join(outside) if len(outside) < 3 else "least, mean and greatest"
+    apart = f"; outside the predicted intervals: the measured {names} peak" if outside else ""
     if found["greatest"] is None:
-        return "the model's free motion ends with a fall of the block"
+        return f"the model's free motion ends with a fall of the block{apart}"
     repeats = f"repeats every {found['repeats']} cycles" if found["repeats"] else "does not repeat"
     text = f"the model's free motion {repeats}, with peaks up to alpha_2 = {found['greatest']:.3f}"
     low, high = found["low"][-1], found["high"][-1]
     if low is not None:
-        text += f" ({low:.3f} to {high:.3f} for 95 % of the specimens within the uncertainty)"
-    return f"{text}; outside the predicted range: measured {' and '.join(outside)} peak" if outside else text
+        text += f" ({low:.3f} to {high:.3f} for a specimen within the uncertainty, with 95 %)"
+    return text + apart

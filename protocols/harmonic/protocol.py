@@ -48,9 +48,9 @@ class HarmonicParameters(SineParameters, HarmonicPoints):
     free_cycles: int | None = quantity(
         96,
         "1",
-        "number of cycles before the settle limit in which the drive of a motion that is not steady is constant, at "
-        "most half of the limit; if absent, it is corrected until the limit",
-        ge=24,
+        "number of cycles before the settle limit in which the drive of a motion that is not steady is not corrected, "
+        "but at most the second half of the limit; 0: corrected until the limit",
+        ge=0,
         le=1000,
     )
 
@@ -69,7 +69,8 @@ def _end_of_range(side: str, name: str) -> Any:
     return quantity(
         None,
         "1",
-        f"{side} end of the range of alpha_2_{name}_predicted for 95 % of the specimens within the uncertainty",
+        f"{side} end of the interval that contains the predicted alpha_2_{name} of a specimen within the uncertainty "
+        "with 95 %",
     )
 
 
@@ -142,7 +143,7 @@ class HarmonicPoint(Parameters):
     free_agrees: bool | None = quantity(
         None,
         "1",
-        "whether least, mean and greatest peak are within the predicted ranges, each widened by its uncertainty",
+        "whether least, mean and greatest peak are all within the predicted intervals, each widened by its uncertainty",
     )
     alpha_2_orbit: float | None = quantity(
         None, "1", "gain of the orbit about which an unsteady motion revolves, from the mean cycle of the motion"

@@ -221,7 +221,7 @@ attractor = _sine(
     "Long-term motions on a table, where the periodic rocking motion is unstable: period, peaks and falls.\n\n"
     "The motion is simulated from the disturbed orbit over --cycles cycles; the drive keeps the table's harmonics at "
     "their requested values on average. The motion repeats after several cycles, does not repeat, or ends with a fall. "
-    "The range of the greatest peak and the share of falls are computed with randomly drawn specimens. With many "
+    "The ranges of the peaks and the share of falls are computed with randomly drawn specimens. With many "
     "frequencies, the figure is a bifurcation diagram.",
 )
 seismic = _under_records(

@@ -166,7 +166,8 @@ def settle_and_measure(
         yield from report(list(recent))
         over = waited >= limit
         if waited >= last_correction:
-            if over or not detector.judge().steady:
+            # the same allowance as in the verdict at the limit
+            if over or not detector.judge(allowance=2.0).steady:
                 continue
             control.take_full_steps()
         shares = control.next(SineResponse.of(cycles[TRANSIENT:], sine, turn))

@@ -42,7 +42,7 @@ def test_the_peaks_are_compared_with_the_ranges_of_the_specimens(
     assert found.repeats_predicted == 9
     assert found.free_agrees is agrees
     assert found.reason.startswith("not steady; the model's free motion repeats every 9 cycles")
-    assert found.reason.endswith("outside the predicted range: measured greatest peak") is not agrees
+    assert found.reason.endswith("outside the predicted intervals: the measured greatest peak") is not agrees
     for name in ("least", "mean", "greatest"):
         low, predicted, high = (getattr(found, f"alpha_2_{name}_{end}") for end in ("low", "predicted", "high"))
         assert low < predicted < high
