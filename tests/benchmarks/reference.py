@@ -2,10 +2,10 @@
 
     python tests/benchmarks/reference.py [SECONDS]
 
-Needs heyoka and mpmath (`uv sync --dev --group benchmark`) and a processor with 80-bit arithmetic. Prints the end state and
-the peaks that `bench.comparators.case` holds, how far the stored ones are off, and the greatest difference between
-heyoka and mpmath after SECONDS (default 1.0, some five impacts). mpmath is given the equations as the paper prints
-them: at 30 digits their cancellation does not matter.
+Needs heyoka and mpmath (`uv sync --dev --group benchmark`) and a processor with 80-bit arithmetic. Prints the end
+state and the peaks that `bench.comparators.case` holds, how far the stored ones are off, and the greatest
+difference between heyoka and mpmath after SECONDS (default 1.0, some five impacts). mpmath is given the equations
+as the paper prints them: at 30 digits their cancellation does not matter.
 """
 
 import sys
