@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from bench.analysis.cycles import Cycle
 from bench.analysis.gain import SteadyPeak, steady_peak
 from bench.analysis.signals import DRIFT, LASER_1, LASER_2, U1
-from bench.analysis.unsteady_peaks import UnsteadyPeaks, unsteady_peaks
+from bench.analysis.unsteady_peaks import UnsteadyPeaks, uninterrupted, unsteady_peaks
 from sim.attractor import LONGEST_PERIOD, period_of
 
 CYCLES = 4 * LONGEST_PERIOD
@@ -71,13 +71,14 @@ class FreeMotion:
 
 
 def free_motion(cycles: Sequence[Cycle], omega: float) -> FreeMotion:
-    """Description of consecutive cycles at a constant drive of `omega` [rad/s]; peaks and period are those of the last
-    `CYCLES`.
+    """Description of cycles at a constant drive of `omega` [rad/s]; peaks and period are those of the last `CYCLES`.
+
+    Where cycles are missing, period and rate are those of the longest stretch without a missing cycle.
     """
     last = cycles[-CYCLES:]
     return FreeMotion(
         peaks=unsteady_peaks(last, omega),
-        repeats=period_of(np.array([cycle.extreme[[U1, DRIFT]] for cycle in last])),
+        repeats=period_of(np.array([cycle.extreme[[U1, DRIFT]] for cycle in _longest(last)])),
         rate=rate_of(cycles),
     )
 
@@ -97,13 +98,18 @@ def orbit_peak(cycles: Sequence[Cycle], motion: FreeMotion, omega: float) -> Ste
     return steady_peak(cycles[-CYCLES:], omega, deviation**2)
 
 
+def _longest(cycles: Sequence[Cycle]) -> Sequence[Cycle]:
+    """Longest stretch without a missing cycle."""
+    return max(uninterrupted(cycles), key=len)
+
+
 def rate_of(cycles: Sequence[Cycle]) -> Rate | None:
     """Rate from the linear map of changes from cycle to cycle, in the plane of their two largest principal components.
 
     Earlier changes are the instrumental variables of the least-squares problem. Without them, noise of the amplitudes
     would bias the multipliers towards zero; the noise is independent for changes that share no cycle.
     """
-    amplitudes = np.array([cycle.fundamental[[LASER_1, LASER_2]] for cycle in cycles])
+    amplitudes = np.array([cycle.fundamental[[LASER_1, LASER_2]] for cycle in _longest(cycles)])
     moved = np.diff(np.concatenate((amplitudes.real, amplitudes.imag), axis=1), axis=0)
     size = float(np.sum(moved**2))
     if moved.shape[0] < SHORTEST or size == 0.0:

@@ -151,9 +151,11 @@ def _readings(waves: Waves, omega: float, drift: float) -> PeakReadings:
     )
 
 
-def _checks(cycles: Sequence[Cycle], waves: Waves, omega: float, frame: LinearFrame) -> Checks:
-    """Harmonics of both lasers' readings, without those due to the table."""
+def _checks(cycles: Sequence[Cycle], waves: Waves, omega: float, frame: LinearFrame) -> Checks | None:
+    """Harmonics of both lasers' readings, without those due to the table; None if only the fundamental was fitted."""
     fitted = min((cycle.coefficients.shape[0] - 1) // 2 for cycle in cycles)
+    if fitted < 2:
+        return None
     table = np.array([cycle.harmonics(ACCELERATION)[1:fitted] for cycle in cycles]).mean(axis=0)
     orders = range(2, table.size + 2)
     moved = np.array([frame.readings(k * omega, complex(z)) for k, z in zip(orders, table, strict=True)]).reshape(-1, 2)

@@ -154,6 +154,17 @@ class SensorUncertainty:
         """Errors [m] of the peaks due to the linearity of laser 0 or 1, in each test, shape (tests, n)."""
         return self._linearity(laser, self._shape(laser, seen), len(seen), draws)
 
+    def u1_linearity(self, seen: Sequence[PeakReadings], table: Sequence[float], draws: "Draws") -> Array:
+        """Errors [m] of the peaks of u1 due to the linearity of laser 0 and, if it is calibrated, of the calibration's
+        reference sensor, shape (tests, n). The reference sensor also measures the displacements `table` [m] at the
+        peaks, which are zero if the lasers are on the table.
+        """
+        errors = self.linearity(0, seen, draws)
+        weights = np.array([1.0, -1.0])
+        effects = [Effect(np.array([each.lasers[0], x]), weights) for each, x in zip(seen, table, strict=True)]
+        common = self._common(effects, _shares(seen))
+        return errors if common is None else errors + common.draws(draws.normal(len(seen)))
+
     def _linearity(self, laser: int, shape: LinearityErrors | None, tests: int, draws: "Draws") -> Array:
         normal = draws.normal(tests)
         if self.calibration is None:
@@ -164,7 +175,12 @@ class SensorUncertainty:
 
     def shapes(self, seen: Sequence[PeakReadings]) -> "Shapes":
         """Errors of the peaks due to the unknown shapes of the linearity errors."""
-        return Shapes((self._shape(0, seen), self._shape(1, seen)), self._common(seen))
+        effects = list[Effect]()
+        for each in seen:
+            first, second = each.effect(0), each.effect(1)
+            places = np.append(first.places, second.places)
+            effects.append(Effect(places, np.append(-first.weights, second.weights)))
+        return Shapes((self._shape(0, seen), self._shape(1, seen)), self._common(effects, _shares(seen)))
 
     def _shape(self, laser: int, seen: Sequence[PeakReadings]) -> LinearityErrors | None:
         """Linearity errors of laser 0 or 1; for a calibrated laser, only those outside the calibrated range, None if no
@@ -195,15 +211,12 @@ class SensorUncertainty:
             if each is not None and each.waves > SMOOTH
         )
 
-    def _common(self, seen: Sequence[PeakReadings]) -> LinearityErrors | None:
-        """Errors of the reference sensor of the calibration, common to both lasers; None without a calibration."""
+    def _common(self, effects: Sequence[Effect], shares: Array) -> LinearityErrors | None:
+        """Errors due to the reference sensor of the calibration, whose error curve is common to both lasers; None
+        without a calibration. For `shares` see `linearity_errors`.
+        """
         if self.calibration is None:
             return None
-        effects = list[Effect]()
-        for each in seen:
-            first, second = each.effect(0), each.effect(1)
-            places = np.append(first.places, second.places)
-            effects.append(Effect(places, np.append(-first.weights, second.weights)))
         # the harmonics that remain in the corrected readings of the bare frame check the reference sensor
         curves, step = self.calibration.lasers, self.accuracy.laser_resolution
         kept = [widest([both[laser] for both in self.checks]) for laser in (0, 1)]
@@ -213,7 +226,7 @@ class SensorUncertainty:
             for each, curve in zip(test, curves, strict=True)
         ]
         limit = self.calibration.common_linearity
-        return linearity_errors(effects, _shares(seen), limit, min(self.ranges), checks)
+        return linearity_errors(effects, shares, limit, min(self.ranges), checks)
 
     def late(self, seen: PeakReadings, laser: int, draws: "Draws") -> Array:
         """Errors [m] due to the delay of a laser with a free-running clock, uniform within one measuring period, shape
@@ -234,11 +247,13 @@ class SensorUncertainty:
 
 
 def _shares(seen: Sequence[PeakReadings]) -> Array:
-    """Derivatives, with respect to the peaks, of the logarithm of the ratio of the last peak to the first, or of a
-    single peak.
+    """Derivatives, with respect to the peaks, of the logarithm of the ratio of the second peak to the first, or of a
+    single peak. Further peaks, which may be the true largest ones of these tests, are not part of the ratio.
     """
     shares = np.array([each.sign / each.drift for each in seen])
-    shares[:-1] *= -1.0
+    if shares.size > 1:
+        shares[0] *= -1.0
+        shares[2:] = 0.0
     return shares
 
 

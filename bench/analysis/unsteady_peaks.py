@@ -41,7 +41,7 @@ class UnsteadyPeaks:
 
 def unsteady_peaks(cycles: Sequence[Cycle], omega: float) -> UnsteadyPeaks:
     """Peaks of consecutive cycles at `omega` [rad/s], relative to the storeys at rest."""
-    windows = [_Windows.of(each) for each in _uninterrupted(cycles)]
+    windows = [_Windows.of(each) for each in uninterrupted(cycles)]
     least = min(windows, key=lambda each: each.largest.min())
     greatest = max(windows, key=lambda each: each.largest.max())
     noise = max(each.noise for each in windows)
@@ -122,7 +122,7 @@ def _smoothed(traces: Array, half: int) -> tuple[Array, float]:
     return smooth, sqrt(residual * leverage / (1.0 - leverage))
 
 
-def _uninterrupted(cycles: Sequence[Cycle]) -> list[list[Cycle]]:
+def uninterrupted(cycles: Sequence[Cycle]) -> list[list[Cycle]]:
     """Stretches of cycles without a missing cycle."""
     found: list[list[Cycle]] = [[cycles[0]]]
     for cycle in cycles[1:]:

@@ -21,7 +21,7 @@ from protocols.earthquake.forecast import Combination, beyond_limits, combinatio
 from protocols.earthquake.laser_check import laser_check
 from protocols.earthquake.measurement import STEP, Histories
 from protocols.earthquake.plan import EarthquakePlan
-from protocols.earthquake.protocol import EarthquakeParameters
+from protocols.earthquake.protocol import EarthquakeParameters, PointStatus
 from protocols.earthquake.records import FileSources, LeftOut, Shaking, band_used, shakings
 from protocols.earthquake.table import TableSource
 from sim.gain import SeismicGain, seismic_curve
@@ -230,6 +230,13 @@ _SOURCES = {
 }
 """Fields of the gain and of its uncertainty, by the source of the gain."""
 
+_TOPPLED = {
+    "alpha_2": (PointStatus.OVERTURNED,),
+    "alpha_2_predicted": (PointStatus.MEASURED,),
+    "alpha_2_target": tuple(PointStatus),
+}
+"""Statuses of points without a gain whose block, or that of the model, topples; the gain of other points is unknown."""
+
 
 def check_statement(points: Sequence[PointLike], band: tuple[float, float]) -> dict[str, Any]:
     """Verdicts on each part of the statement ("holds", "does not hold" or "undecided"), with the gains, per record and
@@ -280,12 +287,15 @@ def _record(name: str, rows: list[Mapping[str, Any]], gain: str, uncertainty: st
     gains = [row[gain] for row in rows]
     doubts = [0.0 if uncertainty is None else row[uncertainty] or 0.0 for row in rows]
     known = [(value, doubt) for value, doubt in zip(gains, doubts, strict=True) if value is not None]
+    below = [_below_one(value, doubt) for value, doubt in known]
+    # a block that topples has no gain, and counts as a failure of alpha_2 < 1, as in the predicted statement
+    below += ["does not hold"] * sum(row[gain] is None and row["status"] in _TOPPLED[gain] for row in rows)
     return {
         "record": name,
         "beta": [row["beta"] for row in rows],
         "alpha_2": gains,
         "toppled": [row["beta"] for row in rows if row["status"] == "overturned"],
-        "below_one": _all([_below_one(value, doubt) for value, doubt in known] + ["undecided"] * (not known)),
+        "below_one": _all(below),
         "towards_one": _towards_one(known) if len(known) > 1 else "undecided",
     }
 

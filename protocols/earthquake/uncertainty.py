@@ -222,14 +222,15 @@ def drift_errors(
 def u1_errors(
     peaks: tuple[PeakSeen, PeakSeen], sensors: SensorUncertainty, grounded: bool, n: int, seed: int | SeedSequence
 ) -> Array:
-    """Drawn relative errors of the peaks of u1, shape (2, n); with lasers on the ground they include the error of the
+    """Drawn relative errors of the peaks of u1, shape (2, n); with lasers on the ground they include the errors of the
     displacement sensor.
     """
     random = np.random.default_rng(seed)
     seen = [_sighting(peak) for peak in peaks]
     sides = np.array([[each.sign] for each in seen])
     draws = Draws(random, n)
-    errors = sides * sensors.linearity(0, seen, draws)
+    table = [each.sign * peak.table if grounded else 0.0 for each, peak in zip(seen, peaks, strict=True)]
+    errors = sides * sensors.u1_linearity(seen, table, draws)
     if grounded:
         errors += np.outer([peak.table for peak in peaks], sensors.table_scale * random.standard_normal(n))
     for row, each in zip(errors, seen, strict=True):

@@ -52,7 +52,8 @@ def _predicted(
     """Characteristics of the long-term motion, from the cache if possible; None without a rocking orbit on the
     table.
     """
-    shaker, known = configuration.simulated_shaker, configuration.known_on_table
+    # the model of the table contains the recoil: it is not an uncertainty here
+    shaker, known = configuration.simulated_shaker, configuration.known
     if shaker is None:
         return None
     inputs = [each.model_dump(mode="json") for each in (specimen, known, shaker)]

@@ -19,6 +19,7 @@ from bench.datafile.reader import DataFile
 from bench.engine.steps import Arm, Calibrate, Dwell, Measured, Outcome, Publish, SetHarmonics, Step, Sweep
 from bench.events import Acquired, Event, PointFinished, StepStarted
 from bench.live_values import Estimate
+from bench.replay.session import stored_configuration
 from protocols.common.sine.settling import (
     JUDGED,
     LASERS,
@@ -71,7 +72,9 @@ class HarmonicFollower:
         self._rate = record.sample_rate
         self._cycles = settings.measured_cycles or parameters.measured_cycles
         self._tolerance = settings.settle_tolerance or parameters.settle_tolerance
-        self._amplitude = parameters.amplitude_factor * configuration.known_specimen.uplift_acceleration
+        # the table was driven for the recorded specimen
+        recorded = stored_configuration(record).known_specimen
+        self._amplitude = parameters.amplitude_factor * recorded.uplift_acceleration
         self._calibration = DriveCalibration.flat(1.0)
         self._read = 0
         self._last: Sweep | None = None

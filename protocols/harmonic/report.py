@@ -172,6 +172,8 @@ def _gains(campaign: Campaign, points: Sequence[Mapping[str, Any]]) -> Table:
     rows: list[list[str]] = []
     for row in points:
         measured, predicted = row["alpha_2"], row["alpha_2_predicted"]
+        # an unsteady motion is not on the predicted orbit
+        compared = row["status"] in ("steady", "resting", "held") and measured is not None and predicted
         branch = _branch(campaign, row)
         open_ = row.get("alpha_2_predicted_uncertainty")
         if open_ is None and branch is not None:
@@ -185,7 +187,7 @@ def _gains(campaign: Campaign, points: Sequence[Mapping[str, Any]]) -> Table:
                 row["layer"],
                 with_uncertainty(measured, row["alpha_2_uncertainty"]),
                 with_uncertainty(predicted, open_),
-                percent(measured / predicted - 1.0) if measured is not None and predicted else ABSENT,
+                percent(measured / predicted - 1.0) if compared else ABSENT,
                 yes_or_no(row["agrees"]),
                 ABSENT if stable is None else "stable" if stable else "unstable",
             ]

@@ -168,7 +168,9 @@ class StabilityPlan:
                 else "no stabiliser can be designed for the orbit"
             )
             return StabilityPoint(**fields, status=OrbitStatus.NOT_HELD, reason=reason)
-        found = predicted(orbit, configuration.known_on_table, shaker, p.harmonics)
+        # the model of the table contains the recoil, which otherwise counts as an uncertainty
+        known = configuration.known_on_table if shaker is None else configuration.known
+        found = predicted(orbit, known, shaker, p.harmonics)
         under = law_prediction(
             orbit, found.multiplier, configuration.known_on_table, shaker, p.harmonics, p.impulse_offset
         )

@@ -144,7 +144,8 @@ def _run_one(
                 if ended.status == "completed" and not ended.passed
                 else f"{ended.status}: {ended.reason}"
             )
-            if ended.status == "completed" and good:
+            # an interrupt after the end of the plan does not change the ending
+            if ended.status == "completed" and good and interrupted is None:
                 return None
     except InvalidInput as refused:
         outcome = f"refused: {refused}"

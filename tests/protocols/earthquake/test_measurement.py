@@ -178,8 +178,17 @@ def test_the_statement_falls_as_the_numbers_do() -> None:
     verdicts = {record["record"]: record for record in found["records"]}
     assert verdicts["a"]["below_one"] == "holds"
     assert verdicts["b"]["towards_one"] == "does not hold"
-    assert (verdicts["c"]["below_one"], verdicts["c"]["towards_one"]) == ("undecided", "undecided")
+    # a block that topples is a failure of alpha_2 < 1
+    assert (verdicts["c"]["below_one"], verdicts["c"]["towards_one"]) == ("does not hold", "undecided")
     assert verdicts["c"]["toppled"] == [0.97]
+    unsure = [row("d", 0.25, 0.995), row("d", 0.64, 0.8), row("d", 0.97, None, "not played")]
+    for source, verdict in (
+        ("measured", "undecided"),
+        ("predicted for the achieved motion", "holds"),
+        ("predicted for the requested motion", "does not hold"),
+    ):
+        assert check_statement(unsure, (1.5, 25.0))[source]["below_one"] == verdict
+    assert check_statement([row("e", 0.25, None, "not played")], (1.5, 25.0))["measured"]["below_one"] == "undecided"
 
 
 def test_a_draw_of_the_motion_has_the_stated_noise() -> None:
