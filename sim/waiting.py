@@ -15,6 +15,9 @@ from typing import TypeVar
 STEP = 0.2
 """Longest time for which a signal may remain unhandled [s]."""
 
+KILLED = 2.0
+"""Longest wait for a killed process to end [s]."""
+
 Result = TypeVar("Result")
 Item = TypeVar("Item")
 
@@ -63,7 +66,9 @@ def put(queue: Queue[Item], item: Item, timeout: float) -> bool:
 
 
 def end(process: "Popen[bytes]", timeout: float) -> None:
-    """Wait until a process has ended. After `timeout` [s] the process is killed."""
+    """Wait until a process has ended. After `timeout` [s] the process is killed; if the operating system cannot end it
+    within `KILLED`, because it hangs in a driver, it is left behind.
+    """
 
     def ended(step: float) -> bool:
         try:
@@ -74,7 +79,7 @@ def end(process: "Popen[bytes]", timeout: float) -> None:
 
     if not _repeat(ended, timeout):
         process.kill()
-        _repeat(ended, float("inf"))
+        _repeat(ended, KILLED)
 
 
 def sleep(seconds: float) -> None:

@@ -179,6 +179,8 @@ class _DriveComparison:
         if same.all():
             return
         distance = np.abs(stored.astype(np.float64) - came[: stored.size])
+        # samples of a drive that was lost and could not be recovered
+        distance[np.isnan(distance)] = np.inf
         self._largest = max(self._largest, float(distance.max()))
         if self._first is None and (distance > DRIVE_ROUNDING).any():
             at = int(np.argmax(distance > DRIVE_ROUNDING))
@@ -262,7 +264,11 @@ def _relative_difference(was: Any, now: Any, scale: float) -> float:
         return 0.0 if was == _clipped(now) or (was is None and not now) else np.inf
     if was is None or now is None or isinstance(was, str):
         return 0.0 if was is now else np.inf
-    return 0.0 if was == now else abs(was - now) / max(abs(was), abs(now), scale)
+    if was == now:
+        return 0.0
+    apart = abs(was - now) / max(abs(was), abs(now), scale)
+    # infinite and finite values differ
+    return apart if apart == apart else np.inf
 
 
 def _clipped(text: str) -> str:

@@ -17,6 +17,7 @@ from drivers.daqmx.connection import Connection
 from drivers.daqmx.errors import code_of, translated
 from drivers.daqmx.parameters import SafetyInput, device_name
 from drivers.errors import RigError
+from sim import waiting
 from sim.errors import InvalidInput
 
 ENABLE_TASK = "rockbench_enable"
@@ -96,6 +97,8 @@ WATCHDOG_TASK = "rockbench_watchdog"
 
 _PER_TIMEOUT = 4
 """Maximum number of resets within one time-out."""
+_EXPIRY = 0.05
+"""Additional time [s] for a watchdog to expire and open the relay."""
 _REFUSED = {
     int(DAQmxErrors.WATCHDOG_TIMER_NOT_SUPPORTED): "{device} has no watchdog: remove hardware.daq.watchdog",
     int(
@@ -117,7 +120,7 @@ class Watchdog:
         device = chassis or device_name(line)
         self._connection = connection
         self._chassis = chassis
-        self._interval = timeout / _PER_TIMEOUT
+        self._timeout, self._interval = timeout, timeout / _PER_TIMEOUT
         self._last_reset = 0.0
         with translated("creating the watchdog task"):
             try:
@@ -172,8 +175,12 @@ class Watchdog:
                 task.clear_expiration()
             task.stop()
 
+    def await_expiry(self) -> None:
+        """Wait until a watchdog that is no longer reset must have expired and opened the relay."""
+        waiting.sleep(max(0.0, self._last_reset + self._timeout + _EXPIRY - time.monotonic()))
+
     def close(self) -> None:
-        """Clear the task; may be called repeatedly."""
+        """Clear the task, which stops the watchdog; may be called repeatedly."""
         if self._task is not None:
             try:
                 with translated("clearing the watchdog task"):

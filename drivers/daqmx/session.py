@@ -57,7 +57,7 @@ class DaqSession:
         self._lock = threading.RLock()
         self._state = _State.IDLE
         self._at_rest = True
-        self._cut = False
+        self._cut, self._cuts = False, 0
         self._lost = False
         self._connection = Connection.of(daq)
         try:
@@ -121,11 +121,17 @@ class DaqSession:
                 with self._resting_on_failure():
                     self._tasks.marker.run_free(pulses)
 
-    def prepare(self) -> None:
+    @property
+    def cuts(self) -> int:
+        """Number of calls of `cut`."""
+        return self._cuts
+
+    def prepare(self, cuts: int | None = None) -> None:
         """Set the output to 0 V, prepare it to start on the inputs' trigger, close the enable relay, and wait for the
         amplifier. The sample clock is started later, by `start`.
 
-        Raises RigError if a step fails; ConnectionLost requires a new session.
+        `cuts` is their number when the caller began to arm: nothing is prepared if there was another one since. Raises
+        RigError if a step fails; ConnectionLost requires a new session.
         """
         with self._lock:
             self._require(_State.IDLE, "prepare")
@@ -141,6 +147,9 @@ class DaqSession:
             self._rest()
             self._state, self._at_rest, self._cut = _State.PREPARED, False, False
             with self._resting_on_failure():
+                # a cut from another thread before the reset of `_cut` above has changed the number
+                if cuts not in (None, self._cuts):
+                    self._cut = True
                 self._tasks.prepare(lambda: self._cut)
 
     def write(self, volts: NDArray[np.float64]) -> None:
@@ -220,6 +229,8 @@ class DaqSession:
         no enable line or the device did not respond, so that only the emergency stop remains. Never raises. The sample
         clock runs until `stop`; the watchdog is no longer reset.
         """
+        # in this order, see `prepare`
+        self._cuts += 1
         self._cut = True
         return self._tasks.relay is not None and self._tasks.relay.cut()
 

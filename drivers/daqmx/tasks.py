@@ -51,6 +51,7 @@ class Tasks:
         self.heartbeat: Heartbeat | None = None
         self.safety: SafetyInputs | None = None
         self.was_reset = False
+        self._relay_failed = False
         self.ready_delay = None if daq.amplifier_ready is None else daq.amplifier_ready.delay
         """Longest time from closing the enable line to the amplifier's ready signal [s]; None if the signal does not
         depend on the line.
@@ -103,8 +104,10 @@ class Tasks:
             self.safety.start()
         if self.heartbeat is not None:
             self.heartbeat.beat()
+        _require_not_cut(is_cut)
         if self.relay is not None:
             self.relay.energise()
+        # a cut during the preceding call
         _require_not_cut(is_cut)
         if self.safety is not None and self.ready_delay is not None:
             self._await_amplifier(self.safety, self.ready_delay, is_cut)
@@ -130,7 +133,7 @@ class Tasks:
 
         self._end_expiration(attempt, failures)
         if self.relay is not None:
-            attempt(self.relay.open, matters=True)
+            self._relay_failed = not attempt(self.relay.open, matters=True)
         if self.heartbeat is not None:
             # failure is harmless: the line no longer toggles
             attempt(self.heartbeat.rest)
@@ -172,12 +175,18 @@ class Tasks:
             failures.append(RigError("the watchdog had expired: the chassis was reset; open a new session"))
 
     def clear(self) -> None:
-        """Release all tasks, unless another client owns them; failures are ignored. May be called repeatedly."""
+        """Release all tasks, unless another client owns them; failures are ignored. May be called repeatedly.
+
+        If the relay could not be opened, first wait until the watchdog has opened it: clearing its task stops it.
+        """
         with self._made, suppress(RigError):
             if not self.inputs.is_owner():
                 self._made.pop_all()
                 if self.watchdog is not None:
                     self.watchdog.let_go()
+            elif self.watchdog is not None and self._relay_failed:
+                self.watchdog.await_expiry()
+                self._relay_failed = False
 
     def _await_amplifier(self, safety: SafetyInputs, delay: float, is_cut: Callable[[], bool]) -> None:
         clock = WallClock()

@@ -28,8 +28,10 @@ from drivers.timebase.marking import GOLDEN, Pulses, golden_pulses, observation_
 
 _SETTLING = 0.05
 """Shortest time between the end of the pulses and the first sample of a run [s]."""
-_CHUNK = 0.1
-"""Longest read during the pulses [s]; short, because each read also serves the watchdog and the heartbeat relay."""
+_CHUNK = 0.02
+"""Longest read during the pulses [s]; short, because each read also serves the watchdog and the heartbeat relay, whose
+shortest time-out is 0.1 s, and whose line rises at every second read.
+"""
 _FIRST_READINGS = 20
 """Number of readings of the sample clock directly after its start, when there are no earlier ones."""
 
@@ -112,10 +114,11 @@ class HardwareRig(RigBase):
 
     def arm(self) -> None:
         self.require_stopped("arm", REARM)
+        cuts = self._daq.cuts
         if self._tracks is not None:
             self._tracks.begin(self.sample_rate, self.clock, self._between)
         with self._ending_on_failure():
-            self._daq.prepare()
+            self._daq.prepare(cuts)
             if self.skipped:
                 self._daq.write(np.zeros(self.skipped))
         self._drive.begin()

@@ -166,9 +166,10 @@ class Tracks:
 
     def raw(self) -> tuple[RawValues, ...]:
         """The values, before resampling, that were received since the last call or since the run began."""
-        # if a sensor has failed, the values received before the failure are returned
-        with suppress(RigError):
-            self._take()
+        for track, raw in zip(self._tracks, self._raw, strict=True):
+            # if a sensor has failed, the values received before the failure are returned
+            with suppress(RigError):
+                _take(track, raw)
         taken, self._raw = self._raw, [[] for _ in self._tracks]
         return tuple(
             self._raw_values(track.channel.name, readings)
@@ -220,10 +221,15 @@ class Tracks:
 
     def _take(self) -> None:
         for track, raw in zip(self._tracks, self._raw, strict=True):
-            readings = track.sensor.take()
-            if readings.index.size:
-                raw.append(readings)
-            track.placing.add(readings.index, readings.time, readings.code, readings.arrival)
+            _take(track, raw)
+
+
+def _take(track: Track, raw: list[Readings]) -> None:
+    """Take the values received by a sensor, and append them to `raw`."""
+    readings = track.sensor.take()
+    if readings.index.size:
+        raw.append(readings)
+    track.placing.add(readings.index, readings.time, readings.code, readings.arrival)
 
 
 def longest_wait(lead: float, passed: float) -> float:

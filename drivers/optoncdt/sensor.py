@@ -212,7 +212,8 @@ class SerialLaser:
     def take(self) -> Readings:
         """The values received since the last call, limited to the last 60 s; never waits.
 
-        Raises ConnectionLost if the port has disappeared or the sensor has restarted, RigError before `start`.
+        Raises ConnectionLost if the port has disappeared or the sensor has restarted, once the values received before
+        have been taken, and RigError before `start`.
         """
         if self._stream is None:
             raise RigError(f"take is refused: {self._who} was not started; start it first")

@@ -80,11 +80,13 @@ class Stream:
         return self._dialogue.judged(command, reply, timeout)
 
     def take(self) -> Readings:
-        """The values received since the last call, limited to the last 60 s; never waits. Raises ConnectionLost."""
-        self._raise_failure()
+        """The values received since the last call, limited to the last 60 s; never waits. After a failure, raises
+        ConnectionLost once the values received before it have been taken.
+        """
         with self._changed:
             held, self._held, self._holding = self._held, deque(), 0
         if not held:
+            self._raise_failure()
             return Readings(np.empty(0, np.int64), np.empty(0), np.empty(0, np.int32), np.empty(0))
         frames = [frames for frames, _ in held]
         return Readings(

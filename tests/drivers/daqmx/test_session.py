@@ -148,6 +148,18 @@ def test_a_cut_is_undone_by_the_next_run_only(session: DaqSession, plant: Loopba
     assert plant.enabled
 
 
+def test_a_cut_since_the_arming_began_prevents_the_run(session: DaqSession, plant: Loopback) -> None:
+    cuts = session.cuts
+    session.cut()
+    plant.ever_enabled = False
+    with pytest.raises(RigError, match="enable line was cut"):
+        session.prepare(cuts)
+    assert not plant.ever_enabled
+    session.stop()
+    driving(session)
+    assert plant.enabled
+
+
 def test_without_enable_line_there_is_nothing_to_cut(open_session: OpenSession, plant: Loopback) -> None:
     session = driving(open_session(enable_line=None))
     assert session.cut() is False

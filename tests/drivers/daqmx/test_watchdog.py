@@ -77,6 +77,19 @@ def test_a_relay_that_could_not_be_opened_is_opened_by_the_watchdog(
     eventually(lambda: is_safe(plant))
 
 
+def test_a_session_that_could_not_open_the_relay_is_not_closed_before_the_watchdog_has(
+    session: DaqSession, server: DaqServer, plant: Loopback
+) -> None:
+    driving(session)
+    for _ in range(4):
+        server.fail_next("WriteDigitalLines", -200077)
+    with pytest.raises(RigError, match="press the emergency stop"):
+        session.stop()
+    with pytest.raises(RigError, match="press the emergency stop"):
+        session.close()
+    assert not plant.enabled
+
+
 def test_a_cut_ends_the_telling(session: DaqSession, server: DaqServer, plant: Loopback) -> None:
     driving(session)
     assert session.cut() is True

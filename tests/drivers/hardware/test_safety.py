@@ -108,6 +108,19 @@ def test_a_halt_from_another_thread_is_no_input_that_opened(laboratory: Laborato
     assert all(all(one.values()) for one in seen)
 
 
+def test_a_halt_while_the_lasers_are_observed_prevents_the_run() -> None:
+    with (
+        Laboratory(VirtualBenchParameters(), Specimen(), seed=1, connection="serial") as laboratory,
+        HardwareRig(laboratory.hardware, lead=LEAD) as rig,
+    ):
+        halt = threading.Timer(0.2, rig.halt)
+        halt.start()
+        with pytest.raises(RigError, match="enable line was cut"):
+            rig.arm()
+        halt.join()
+        assert not laboratory.bench.enabled
+
+
 @pytest.mark.parametrize(
     ("device", "modules"),
     [

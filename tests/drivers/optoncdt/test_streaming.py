@@ -187,6 +187,21 @@ def test_an_unplugged_sensor_is_told_by_take_every_time() -> None:
         laser.close()
 
 
+def test_values_from_before_a_failure_are_not_lost() -> None:
+    with no_thread_left(), Peer(streaming(30)[:], tidy=False) as peer:
+        laser = opened(peer)
+        laser.start()
+        stream = laser._stream
+        assert stream is not None
+        until(lambda: stream._holding == 30 - LOCK)
+        peer.unplug()
+        until(lambda: stream._failure is not None)
+        assert len(laser.take()) == 30 - LOCK
+        with pytest.raises(ConnectionLost):
+            laser.take()
+        laser.close()
+
+
 def test_a_sensor_that_was_switched_off_in_between_is_a_lost_connection() -> None:
     with Peer([*streaming(3000), *STOPPED]) as peer, opened(peer) as laser:
         laser.start()
