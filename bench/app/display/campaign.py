@@ -73,6 +73,12 @@ class Campaign:
             case _:
                 pass
 
+    def end(self) -> None:
+        """End the measurement of the current point without a result."""
+        if self.current is not None and self.cells[self.current].status == texts.POINT_MEASURED:
+            self.cells[self.current] = Cell()
+        self.current = None
+
     def expected(self, place: Place, remaining: float, now: datetime) -> datetime | None:
         """Estimated end of a point, on the assumption that all unfinished points take equal parts of the `remaining`
         time [s]; None for a finished point, or if `remaining` is not finite.
@@ -85,8 +91,7 @@ class Campaign:
     def _measure(self, at: Mapping[str, Any]) -> None:
         place = self._place(at)
         if place != self.current:
-            if self.current is not None and self.cells[self.current].status == texts.POINT_MEASURED:
-                self.cells[self.current] = Cell()
+            self.end()
             self.current = place
         if place is not None:
             self.cells[place] = Cell(texts.POINT_MEASURED)
@@ -94,7 +99,10 @@ class Campaign:
     def _place(self, point: Mapping[str, Any]) -> Place | None:
         assert self._axes is not None
         found = [
-            next((k for k, value in enumerate(values) if _same(value, point.get(axis.field))), None)
+            # a running value need not state a parameter that has a single value
+            0
+            if len(values) == 1 and axis.field not in point
+            else next((k for k, value in enumerate(values) if _same(value, point.get(axis.field))), None)
             for axis, values in zip(self._axes, (self.rows, self.columns), strict=True)
         ]
         return None if found[0] is None or found[1] is None else (found[0], found[1])

@@ -16,7 +16,7 @@ from bench.app.display.verdict import running_verdict, verdict_of
 from bench.app.formatting import measurement
 from bench.app.ipc.messages import Run
 from bench.document.typography import label
-from bench.events import Event, PointFinished, SpecimenMounted
+from bench.events import Event, PointFinished, SpecimenMounted, StepStarted
 from bench.findings import FitFinished, TableIdentified
 from bench.live_values import Estimate, LiveValue, RunningGain
 from bench.protocol import Protocol
@@ -39,16 +39,21 @@ class RunContents:
 
     def __init__(self, run: Run | None = None) -> None:
         self.protocol: Protocol[Any] | None = None if run is None else load_protocol(run.protocol)
-        self.sentence = texts.NO_GAIN if self.has_gain else texts.NO_RESULT
+        self.sentence = self._nothing
         self.point = ""
         self.arrangement = Arrangement() if run is None else Arrangement.of(run.configuration.known_specimen)
         self.arranged = -inf
-        self._has_live_value = False
+        self._has_live_value = self._running = False
 
     @property
     def has_gain(self) -> bool:
         """Whether the points of the protocol have a gain; True before the first run."""
         return self.protocol is None or "alpha_2" in self.protocol.point.model_fields
+
+    @property
+    def _nothing(self) -> str:
+        """Sentence before the first result."""
+        return texts.NO_GAIN if self.has_gain else texts.NO_RESULT
 
     def instant(
         self, ring: Ring, block: BlockAngle, moment: float
@@ -63,13 +68,11 @@ class RunContents:
         """Update the contents with an event."""
         match event:
             case Estimate():
-                self.point = texts.MEASURING.format(point=_sine(event.omega, event.beta))
-                self.sentence = running_verdict(event)
-                self._couple(event.beta)
+                self._show_running(event, _sine(event.omega, event.beta))
             case RunningGain():
-                self.point = texts.MEASURING.format(point=_record(event.record, event.beta))
-                self.sentence = running_verdict(event)
-                self._couple(event.beta)
+                self._show_running(event, _record(event.record, event.beta))
+            case StepStarted():
+                self.end_step()
             case LiveValue():
                 self._has_live_value = True
                 self.sentence = running_verdict(event)
@@ -83,8 +86,20 @@ class RunContents:
             case _:
                 pass
 
+    def end_step(self) -> None:
+        """Remove the running gain of a step that has ended: the motion to which it belongs has ended as well."""
+        if self._running:
+            self._running, self.point = False, ""
+            self.sentence = self._nothing
+
+    def _show_running(self, event: Estimate | RunningGain, place: str) -> None:
+        self.point = texts.MEASURING.format(point=place)
+        self.sentence, self._running = running_verdict(event, self._nothing), True
+        self._couple(event.beta)
+
     def _finish(self, event: PointFinished) -> None:
         """Show the result of a point, with the same uncertainty as in the log and the data file."""
+        self._running = False
         point, protocol = event.point.model_dump(), self.protocol
         if protocol is None:
             return

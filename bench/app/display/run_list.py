@@ -73,6 +73,13 @@ class RunRow:
     figure: Path | None = None
 
     @property
+    def stale(self) -> bool:
+        """Whether the row states that its run is in progress although the file has not changed recently: the program
+        that wrote it may have been killed.
+        """
+        return self.cells[1] == texts.RUN_GOING and time() - self.found.changed >= RECENT
+
+    @property
     def searched(self) -> str:
         """All texts of the row, in lower case, for a search."""
         return "\n".join((*self.cells, *self.tips)).lower()

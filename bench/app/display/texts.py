@@ -19,7 +19,7 @@ NO_SESSION, STARTING, PLANNING, NO_LINK = "NO RUN", "STARTING", "PLANNING", "NO 
 NO_SESSION_WHY = "no run has been started in this window; choose a protocol"
 NO_RUN_HERE = "no run is under way on this computer"
 RUN_ELSEWHERE, ATTACHING = "RUN ELSEWHERE", "ATTACHING"
-ELSEWHERE = "a run is under way on this computer: {run}; attach to watch or stop it"
+ELSEWHERE = "a run is under way on this computer: {run}; attach to watch it, STOP ends it"
 ATTACHING_WHY = "waiting for the session: {run}"
 PLANNING_LATE = "no message for {age:.0f} s: the computer may be busy; nothing is armed"
 ATTACHED_RUN = "{owner}'s run: {run}."
@@ -434,6 +434,8 @@ POINT_MARKS = {
     "held": ("■", "wait"),
     "overturned": ("✕", "alarm"),
     "not played": ("–", "calm"),
+    "not held": ("?", "wait"),
+    "not measurable": ("?", "wait"),
 }
 """Mark and level (colour) of a point, by its status; all other statuses have those of a finished point."""
 EXPECTED = "≈ {time:%H:%M}"

@@ -27,9 +27,9 @@ def verdict_of(view: RunView, finished: Parameters) -> str:
     return " · ".join(part for part in (texts.NO_GAIN_OF.format(status=status), typeset(reason)) if part)
 
 
-def running_verdict(event: Estimate | RunningGain | LiveValue) -> str:
+def running_verdict(event: Estimate | RunningGain | LiveValue, nothing: str = texts.NO_GAIN) -> str:
     """A running value with its prediction, its difference from the prediction, and, for a gain, the cycles or seconds
-    measured so far.
+    measured so far; `nothing` is the text for a gain that is unknown.
     """
     if isinstance(event, LiveValue):
         label = typeset(event.label)
@@ -38,7 +38,7 @@ def running_verdict(event: Estimate | RunningGain | LiveValue) -> str:
     else:
         own, predicted = event.alpha_2, event.predicted
         uncertainty = event.uncertainty if isinstance(event, Estimate) else nan
-        value = f"{texts.ALPHA} {plus_minus(own, uncertainty)}" if isfinite(own) else texts.NO_GAIN
+        value = f"{texts.ALPHA} {plus_minus(own, uncertainty)}" if isfinite(own) else nothing
         effort = (
             counted(event.cycles, "cycle")
             if isinstance(event, Estimate)

@@ -84,6 +84,13 @@ class Reader(QObject):
         _threads.add(thread)
         thread.start()
 
+    def drop(self) -> None:
+        """Drop all earlier calls: their results are not emitted."""
+        self._latest += 1
+        self._told = self._latest
+        with self._lock:
+            self._waiting = None
+
     def _work(self) -> None:
         while True:
             with self._lock:

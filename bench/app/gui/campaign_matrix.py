@@ -62,6 +62,12 @@ class MatrixView(QTableWidget):
         if before != self.campaign.current or isinstance(event, PointFinished):
             self.refresh(remaining)
 
+    def end(self) -> None:
+        """Show the points of a run that has ended."""
+        if self.campaign is not None:
+            self.campaign.end()
+            self.refresh(float("nan"))
+
     def refresh(self, remaining: float) -> None:
         """Show every point, and the expected end of each one that is not finished; `remaining` as in `follow`."""
         campaign = self.campaign

@@ -78,7 +78,7 @@ class Controller(QObject):
         """Reason why only the queue may start a run; empty if there is none."""
         self.latched = False
         """Whether STOP was pressed and not cleared since."""
-        self._pressed_at = 0.0
+        self._pressed_at: float | None = None
         self._timer = QTimer(self, interval=PERIOD, timerType=Qt.TimerType.PreciseTimer)
         self._timer.timeout.connect(self._look)
         self._timer.start()
@@ -96,6 +96,11 @@ class Controller(QObject):
         if self._running:
             return texts.START_BUSY
         return texts.START_ELSEWHERE if self.elsewhere is not None and self.elsewhere.real else ""
+
+    @property
+    def cuts_next(self) -> bool:
+        """Whether STOP has been pressed during this run: the next press cuts the enable line."""
+        return self._running and self._pressed_at is not None
 
     @property
     def owner(self) -> str:
@@ -151,7 +156,6 @@ class Controller(QObject):
         stop.
         """
         if not self._running:
-            self.latched = False
             self._use(AttachedClient(session, self._call), session)
             self.changed.emit()
 
@@ -159,7 +163,7 @@ class Controller(QObject):
         """Detach from a session; its run is not affected."""
         link = self._link
         if link is not None and self.session.attached is not None:
-            self._link, self._running, self.session, self.latched = None, False, SessionState(), False
+            self._link, self._running, self.session = None, False, SessionState()
             link.leave()
             self.question_changed.emit(None)
             self.changed.emit()
@@ -167,27 +171,31 @@ class Controller(QObject):
     def _use(self, link: ClientConnection, attached: RunningSession | None) -> None:
         self.session, self.elsewhere = SessionState(attached), None
         self._waiting.clear()
-        self._link, self._running = link, True
+        self._link, self._running, self._pressed_at = link, True, None
 
     def _begin(self, run: Run) -> None:
         self.began.emit(run)
         self.changed.emit()
 
     def press_stop(self) -> None:
-        """Handle a press of STOP, which latches: the first press ramps the output quickly to zero; another press, at
-        least `DELIBERATE` seconds after the first, cuts the enable line.
+        """Handle a press of STOP, which latches: the first press during a run ramps the output quickly to zero; another
+        press, at least `DELIBERATE` seconds after the first, cuts the enable line. A run that is under way elsewhere,
+        and is named in the header, is attached and ended in the same way.
         """
-        first = not self.latched
-        if first:
-            self._pressed_at = now()
-        if self._link is not None and (first or now() - self._pressed_at >= DELIBERATE):
-            self._link.ask("abort" if first else "halt")
+        if not self._running and self.elsewhere is not None:
+            self.attach(self.elsewhere)
+        if self._link is not None:
+            if self._pressed_at is None:
+                self._pressed_at = now()
+                self._link.ask("abort")
+            elif now() - self._pressed_at >= DELIBERATE:
+                self._link.ask("halt")
         self.latched = True
         self.changed.emit()
 
     def clear_stop(self) -> None:
         """Clear STOP, which allows a new run; has no effect while the stopped run is still under way."""
-        self.latched = self.latched and self._running
+        self.latched = self.latched and self.cuts_next
         self.changed.emit()
 
     def ramp_out(self) -> None:

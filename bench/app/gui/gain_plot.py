@@ -171,6 +171,10 @@ class GainPlot(pg.PlotWidget):
         if x is not None and isfinite(event.alpha_2) and event.alpha_2 > 0.0:
             self._now.setData([x], [self._place(event.alpha_2)])
 
+    def hide_running(self) -> None:
+        """Remove the running estimate."""
+        self._now.setData([], [])
+
     @property
     def _log(self) -> bool:
         return self._kind == "spectrum"

@@ -201,11 +201,11 @@ class Header(QWidget):
         step = " · ".join(typeset(part) for part in now if part)
         self.step.setText(step or "–")
         self.progress.setValue(round(1000 * scene.fraction))
-        again = controller.latched and controller.running
+        again = controller.cuts_next
         self.stop.setText(texts.STOP_AGAIN if again else texts.STOP if key_acts else texts.STOP_BY_MOUSE)
         self.clear.setVisible(controller.latched)
-        self.clear.setEnabled(not controller.running)
-        self.clear.setToolTip(texts.CLEAR_BUSY if controller.running else texts.CLEAR_TIP)
+        self.clear.setEnabled(not again)
+        self.clear.setToolTip(texts.CLEAR_BUSY if again else texts.CLEAR_TIP)
         self._show_inputs()
         self._show_owner()
 

@@ -125,6 +125,7 @@ class HistoryView(QWidget):
         self.shown = []
         self.plot.draw(())
         self.spectrum.draw(())
+        self.reading.setText("")
         self._choose_channel()
         self.show_whole()
 
@@ -153,6 +154,10 @@ class HistoryView(QWidget):
             if self.with_spectrum.isChecked():
                 self._readers[1].call(partial(read_spectra, tracks, begin, end))
             self._probe.start()
+        else:
+            # the results of earlier calls belong to another file
+            for reader in self._readers:
+                reader.drop()
 
     def _choose_channel(self) -> None:
         for action in self._menu.actions():

@@ -13,7 +13,7 @@ from bench.app.gui.gain_plot import GainPlot
 from bench.app.gui.live_plot import LivePlot
 from bench.app.ipc.messages import Run
 from bench.datafile.tables import Table
-from bench.events import Event, PointFinished
+from bench.events import Event, PointFinished, StepStarted
 from bench.live_values import Estimate, RunningGain
 from bench.live_view import Checklist, GainCurve, LiveRun, Panel
 from bench.protocol import Protocol
@@ -80,9 +80,16 @@ class LiveViewArea(QWidget):
             self._running = event
         elif self._run is not None and self._run.follow(event):
             self._changed = True
+        if isinstance(event, StepStarted):
+            self.end_step()
         if isinstance(event, PointFinished):
             self._running = None
             self.gains.add(event.point.model_dump())
+
+    def end_step(self) -> None:
+        """Remove the running gain of a step that has ended."""
+        self._running = None
+        self.gains.hide_running()
 
     def draw(self) -> None:
         """Draw the changes since the last call; the panels are drawn at most once in `INTERVAL`."""

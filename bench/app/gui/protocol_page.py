@@ -63,6 +63,8 @@ class ProtocolPage(QWidget):
         self._checking = self._began = self._unattended = False
         self._edited_test: Queued | None = None
         self._made: Path | None = None
+        self._folder = ""
+        """Text of the folder of the current or last run."""
         # created before the choice of the protocol, so that the values follow that choice in the tab order
         self.presets = PresetBar(presets)
         self.choice = QComboBox()
@@ -156,7 +158,7 @@ class ProtocolPage(QWidget):
             self._show_plan()
             self.plan.refuse(str(error))
             return
-        self._began = True
+        self._began, self._folder = True, self.folder.text()
         self.predicted.emit(checked.prediction)
         self._controller.start(self.options.run(plan))
 
@@ -293,10 +295,11 @@ class ProtocolPage(QWidget):
             remove_unused(self._made)
             self._made = None
         if self._began:
-            # the folder is now in use: the next run needs another
             self._began = False
-            self.folder.clear()
-            self._edited()
+            if self._edited_test is None and self.folder.text() == self._folder:
+                # the folder is now in use: the next run needs another
+                self.folder.clear()
+                self._edited()
 
     def _arrange(self) -> None:
         for button, key, tip in (

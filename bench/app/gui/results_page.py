@@ -128,7 +128,8 @@ class ResultsPage(QWidget):
 
     def show_end(self, ended: Ended | Refused) -> None:
         """Show the status of the finished run and open its file, without changing a displayed comparison."""
-        self.show_run()
+        # without the focus, which may be where the operator types
+        self.views.setCurrentWidget(self.view)
         if isinstance(ended, Ended):
             compared = len(self.files.ticked) > 1
             text = texts.ENDED.format(status=ended.status, reason=ended.reason, out=ended.out)

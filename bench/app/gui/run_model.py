@@ -105,7 +105,7 @@ class RunModel(QAbstractTableModel):
         self._found = {each.path: each for each in found}
         self._rows = {path: row for path, row in self._rows.items() if path in self._found}
         self.arrange()
-        return [each for each in found if (row := self._rows.get(each.path)) is None or row.found != each]
+        return [each for each in found if (row := self._rows.get(each.path)) is None or row.found != each or row.stale]
 
     def update(self, rows: Sequence[RunRow]) -> None:
         """Show files that have been read."""

@@ -70,6 +70,7 @@ class RunPage(QWidget):
         controller.event_received.connect(self._tell)
         controller.changed.connect(self._refresh)
         controller.began.connect(self._begin)
+        controller.ended.connect(self._end)
         self._timer = QTimer(self, interval=PERIOD, timerType=Qt.TimerType.PreciseTimer)
         self._timer.timeout.connect(self._draw)
         self._timer.start()
@@ -215,6 +216,15 @@ class RunPage(QWidget):
                     plot.add(event)
             case _:
                 pass
+
+    def _end(self) -> None:
+        """Show that nothing is being measured any more."""
+        self.steady.finish()
+        self.matrix.end()
+        self.live.end_step()
+        self.contents.end_step()
+        self.point.setText(self.contents.point)
+        self.verdict.show_sentence(self.contents.sentence)
 
     def _refresh(self) -> None:
         events, traces = self._controller.session.lost

@@ -21,7 +21,7 @@ from bench.app.ipc.client import AttachedClient
 from bench.app.ipc.messages import TRACES, Attached, Ended, FromSession, Opened, Published, Refused, Traces
 from bench.app.ipc.sessions import RunningSession, running_sessions
 from bench.app.run_display import Notice
-from bench.events import PointFinished, State
+from bench.events import PointFinished, State, StepStarted
 from bench.live_values import Estimate, RunningGain, TwinEstimate
 from bench.live_view import LiveRun, Panel
 from drivers.clock import now
@@ -119,10 +119,15 @@ class RunRecord:
                     case PointFinished():
                         mark, self.running = mark_of(event.point.model_dump()), None
                         self.marks += [] if mark is None else [mark]
+                    case StepStarted():
+                        self.running = None
                     case _:
                         pass
             case Ended() | Refused():
                 self.trouble, self.running = trouble_of(message, driven=self.state.driven), None
+                self.contents.end_step()
+                if self.campaign is not None:
+                    self.campaign.end()
             case _:
                 pass
 

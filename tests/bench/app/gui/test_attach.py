@@ -99,6 +99,31 @@ def test_a_second_window_only_watches_and_stops(qtbot: QtBot, tmp_path: Path) ->
         assert record.status == "aborted"
 
 
+@pytest.mark.usefixtures("session")
+def test_stop_ends_a_run_to_which_the_window_is_not_attached(qtbot: QtBot, tmp_path: Path) -> None:
+    window = opened(qtbot)
+    controller = window.header._controller  # pyright: ignore[reportPrivateUsage]
+    qtbot.waitUntil(lambda: window.header.word.text() == "RUNNING", timeout=LONG_MS)
+    window.header.attach.click()
+    # a STOP from before stays latched, but this run has not been stopped
+    controller.latched = True
+    window.header.attach.click()
+    qtbot.waitUntil(lambda: window.header.word.text() == "RUNNING", timeout=LONG_MS)
+    assert controller.latched
+    assert not controller.cuts_next
+    controller.clear_stop()
+    assert not controller.latched
+    window.header.attach.click()
+    assert window.header.word.text() == "RUN ELSEWHERE"
+    controller.press_stop()
+    assert controller.cuts_next
+    qtbot.waitUntil(lambda: not controller.running, timeout=LONG_MS)
+    assert controller.latched
+    window.close()
+    with open_datafile(tmp_path / "run" / "campaign.h5") as record:
+        assert (record.status, record.summary) == ("aborted", "abort requested")
+
+
 def test_the_announcement_of_a_killed_session_is_removed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ROCKBENCH_SESSIONS", str(tmp_path))
     (tmp_path / "1-abcd.json").write_text("{}")

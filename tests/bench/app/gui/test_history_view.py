@@ -112,6 +112,19 @@ def test_the_cursors_have_the_samples_of_the_file(view: HistoryView, qtbot: QtBo
     assert view.plot.cursors is None
 
 
+def test_nothing_of_a_file_remains_when_none_is_shown(view: HistoryView, qtbot: QtBot) -> None:
+    """Neither the values at the cursors, nor a result of a reading that began before."""
+    view.channel.setCurrentText("laser 1")
+    view.with_cursors.setChecked(True)
+    qtbot.waitUntil(lambda: view.reading.text().endswith("mm"), timeout=LONG_MS)
+    view.read()
+    view.use(None)
+    qtbot.wait(300)
+    assert view.reading.text() == ""
+    assert view.shown == []
+    assert not [*view.plot.lines]
+
+
 def test_the_cursors_are_moved_by_keys(view: HistoryView, qtbot: QtBot) -> None:
     view.channel.setCurrentText("laser 1")
     for action in view._menu.actions():

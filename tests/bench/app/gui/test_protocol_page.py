@@ -13,7 +13,7 @@ from bench.app.display import texts
 from bench.app.display.typography import typeset
 from bench.app.gui.form import Form
 from bench.app.gui.window import Window
-from bench.app.ipc.messages import PlanChecked, Refused, Run
+from bench.app.ipc.messages import Ended, PlanChecked, Refused, Run
 from bench.config.declared import declared
 from bench.preflight.margins import Demand, Margin, bounds
 from bench.protocol import Protocol
@@ -111,6 +111,23 @@ def test_start_follows_the_check(window: Window, spoken: type[ScriptedClient], q
     assert (run.keep_going, run.about) == (True, {"operator": "A. Person"})
     assert window.pages.currentWidget() is window.run
     assert page.why_not == texts.START_BUSY
+
+
+@pytest.mark.parametrize(("typed", "left"), [(None, ""), ("runs/next", "runs/next")])
+def test_the_folder_of_the_next_run_is_kept_when_a_run_ends(
+    typed: str | None, left: str, window: Window, spoken: type[ScriptedClient], tmp_path: Path
+) -> None:
+    page = window.protocol
+    page.folder.setText(str(tmp_path / "first"))
+    page.check_plan()
+    spoken.latest.said.append(FINE)
+    window._controller._look()
+    page.begin()
+    if typed is not None:
+        page.folder.setText(typed)
+    spoken.latest.said.append(Ended("completed", "", {}, "", tmp_path / "first"))
+    window._controller._look()
+    assert page.folder.text() == left
 
 
 @pytest.mark.parametrize("left", [(), ("campaign.h5",)])

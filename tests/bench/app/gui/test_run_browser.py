@@ -6,9 +6,10 @@ import shutil
 import threading
 from collections.abc import Generator
 from pathlib import Path
+from time import time
 
 import pytest
-from PySide6.QtCore import QSize, Qt
+from PySide6.QtCore import QObject, QSize, Qt
 from PySide6.QtGui import QImage
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
@@ -21,6 +22,7 @@ from bench.app.gui.controller import Controller
 from bench.app.gui.figure_view import read_figure
 from bench.app.gui.results_page import ResultsPage
 from bench.app.gui.run_browser import RunBrowser
+from bench.app.gui.run_model import RunModel
 from bench.config.model import BenchConfiguration
 from bench.datafile.reader import open_datafile
 from bench.events import PointFinished
@@ -238,6 +240,26 @@ def test_a_file_that_was_not_closed_is_not_shown_as_running(tmp_path: Path) -> N
     recorder.close("stopped", "")
     assert row.cells[1] == texts.RUN_CUT
     assert "rockbench file recover" in row.tips[1]
+
+
+@pytest.mark.usefixtures("qapp")
+def test_a_run_that_was_killed_is_read_again_without_a_change_of_its_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _, recorder = begun(tmp_path / "killed")
+    owner = QObject()
+    model, found = RunModel(LIGHT, owner), find_runs(tmp_path)
+    assert model.use(found) == [*found]
+    model.update([read_row(each) for each in found])
+    assert model.use(found) == []
+    monkeypatch.setattr(run_list, "time", lambda: time() + 2.0 * run_list.RECENT)
+    assert model.use(found) == [*found]
+    model.update([read_row(each) for each in found])
+    assert model.use(found) == []
+    recorder.close("stopped", "")
+    row = model.row(found[0].path)
+    assert row is not None
+    assert row.cells[1] == texts.RUN_CUT
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,7 @@ from bench.app.gui.traces import AHEAD, LEAST
 from bench.app.gui.window import SMALLEST, Window
 from bench.app.ipc.messages import TRACES, Beat, Ended, PlanChecked, Published, Traces
 from bench.datafile.tables import Column
-from bench.events import PointFinished, SpecimenMounted, State, StateChanged, Warned
+from bench.events import PointFinished, SpecimenMounted, State, StateChanged, StepStarted, Warned
 from bench.findings import FitFinished, FittedParameter, Series
 from bench.live_values import Estimate, LiveValue
 from drivers.clock import now
@@ -222,6 +222,24 @@ def test_the_running_gain_and_the_finished_point(page: RunPage, link: ScriptedCl
     assert page.gains.measured == [(16.0, 0.21)]
     assert page.picture.canvas.arrangement.spring
     assert "▲ warning: drift comes near" in page.log.toPlainText()
+
+
+@pytest.mark.parametrize(
+    "end", [Published(StepStarted("start 2", time=2.0)), Ended("aborted", "", {}, "", Path("never"))]
+)
+def test_a_running_gain_ends_with_its_motion(page: RunPage, link: ScriptedClient, end: Published | Ended) -> None:
+    """The motion after which a block has fallen, for instance."""
+    nothing = page.verdict.sentence
+    running = Estimate(16.0, 0.4, 12, 0.01, 0.24, 0.0041, 0.2, time=1.0)
+    link.said = [Published(running)]
+    page._controller._look()
+    page.gains.show_running(running)
+    assert "0.2400" in page.verdict.sentence
+    assert len(page.gains._now.getData()[0]) == 1
+    link.said = [end]
+    page._controller._look()
+    assert (page.verdict.sentence, page.point.text()) == (nothing, "")
+    assert len(page.gains._now.getData()[0]) == 0
 
 
 def test_the_large_gain_names_its_point_and_its_uncertainty_is_that_of_the_file(
