@@ -116,19 +116,20 @@ class CheckPanel(QWidget):
 
     @property
     def _why_not(self) -> str:
-        if self._controller.running:
-            return texts.START_BUSY
+        if busy := self._controller.why_busy:
+            return busy
         return texts.LATCHED if self._controller.latched else self._controller.held
 
     def _began(self, run: Run) -> None:
-        self._ours = run.protocol == CHECK
+        # the check of another bench, to which this window is attached, is no check of this one
+        self._ours = run.protocol == CHECK and run.configuration == self._configuration
         if self._ours:
             self.lines.clear()
             self.table.setRowCount(0)
             self._say(texts.CHECK_LOOP_RUNNING, "wait")
 
     def _tell(self, event: Event) -> None:
-        if not isinstance(event, PointFinished) or not isinstance(event.point, CheckLine):
+        if not self._ours or not isinstance(event, PointFinished) or not isinstance(event.point, CheckLine):
             return
         line, row = event.point, len(self.lines)
         self.lines.append(line)
@@ -169,6 +170,10 @@ class CheckPanel(QWidget):
         set_level(self.message, level)
 
     def _refresh(self) -> None:
+        if self._ours and not self._controller.running:
+            # the window was detached from the run
+            self._ours = False
+            self._say(texts.CHECK_LOOP_IDLE, "calm")
         why = self._why_not
         self.check.setEnabled(not why)
         self.check.setToolTip(why or texts.CHECK_LOOP_TIP)

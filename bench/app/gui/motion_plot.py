@@ -50,6 +50,7 @@ class MotionPlot(pg.PlotWidget):
         self.kind: Kind = kind
         self.omega: float | None = None
         """Circular frequency of the base motion [rad/s]; None unless a steady sine is being measured."""
+        self._since = 0.0
         self._model = np.zeros((0, 3))
         self._item: Any = self.getPlotItem()
         self._item.hideButtons()
@@ -73,6 +74,18 @@ class MotionPlot(pg.PlotWidget):
         self._line.setPen(pg.mkPen(theme.lines[1], width=1))
         self._behind.setPen(pg.mkPen(theme.faint, width=3))
         self._points.setBrush(pg.mkBrush(theme.lines[2]))
+
+    def begin_sine(self, omega: float, time: float) -> None:
+        """Strobe the motion at the circular frequency `omega` [rad/s] of the base motion, from the bench time `time`
+        [s] on; without effect if this sine is being strobed.
+        """
+        if omega != self.omega:
+            self.omega, self._since = omega, time
+
+    def end_sine(self) -> None:
+        """End the strobing; the points belong to a motion that has ended."""
+        self.omega = None
+        self._points.setData([], [])
 
     def forget(self) -> None:
         """Clear for a new run."""
@@ -104,5 +117,7 @@ class MotionPlot(pg.PlotWidget):
                 model = 1e3 * (self._model[:, 2] - self._model[:, 1])
                 self._behind.setData(model, np.gradient(model, self._model[:, 0]))
         elif self.omega is not None:
-            section = stroboscopic(time[3:-3], np.column_stack((drift, speed))[3:-3], self.omega)
-            self._points.setData(section[:, 0], section[:, 1])
+            inner = slice(3 + int(np.searchsorted(time[3:-3], self._since)), -3)
+            if time[inner].size > 1:
+                section = stroboscopic(time[inner], np.column_stack((drift, speed))[inner], self.omega)
+                self._points.setData(section[:, 0], section[:, 1])

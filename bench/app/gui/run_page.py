@@ -205,11 +205,11 @@ class RunPage(QWidget):
             case Estimate():
                 self.steady.point(event.omega, event.beta)
                 for plot in self.motion:
-                    plot.omega = event.omega
+                    plot.begin_sine(event.omega, event.time)
             case StepStarted():
                 self.steady.finish()
                 for plot in self.motion:
-                    plot.omega = None
+                    plot.end_sine()
             case TwinEstimate():
                 self.block.add(event)
                 for plot in self.motion:
