@@ -88,6 +88,13 @@ def test_a_period_of_nine_cycles_is_found() -> None:
     assert free_motion(cycles, 15.0).repeats == 9
 
 
+def test_a_lost_cycle_hides_neither_period_nor_rate() -> None:
+    cycles, _ = cycles_after(0.97, 15.0, 300)
+    assert free_motion([*cycles[:40], *cycles[41:]], 15.0).repeats == 9
+    near, _ = cycles_after(0.4, 16.0, 10)
+    assert rate_of([*near[:20], *near[21:]]) == rate_of(near[21:])
+
+
 @pytest.mark.parametrize(("beta", "omega", "wait"), [(0.4, 16.0, 10), (0.4, 17.0, 10), (0.25, 17.5, 20)])
 def test_the_rate_of_a_slow_approach_is_the_multiplier_of_the_orbit(beta: float, omega: float, wait: int) -> None:
     cycles, _ = cycles_after(beta, omega, wait)

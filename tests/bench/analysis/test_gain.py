@@ -12,10 +12,12 @@ from hypothesis import strategies as st
 from bench.analysis.cycles import Cycle, fit_cycle
 from bench.analysis.gain import DRAWS, SEED, SensorAccuracy, SteadyPeak, gain, steady_peak
 from bench.analysis.laser_calibration import LaserCalibration, LaserCurve
+from bench.analysis.linearity import LinearFrame
 from bench.analysis.running_gain import shared_draws
 from bench.analysis.sensor_accuracy import SCALES, Draws, PeakReadings, SensorUncertainty
 from bench.analysis.signals import ACCELERATION, DRIFT, LASER_2
 from bench.analysis.unsteady_peaks import unsteady_peaks
+from sim.specimen import Specimen
 from tests.made_cycles import pure_cycle
 
 EXACT = SensorAccuracy(laser_mismatch=0.0, laser_resolution=0.0, laser_timing=0.0, laser_linearity=0.0, table_scale=0.0)
@@ -170,6 +172,44 @@ def _calibrated() -> LaserCalibration:
         common_linearity=1e-5,
         differential_scale=1.0,
     )
+
+
+def _reading(drift: float, sign: float, laser_1: float) -> PeakReadings:
+    lasers = (laser_1, laser_1 + sign * drift)
+    return PeakReadings(drift, sign, lasers, (0.0, 0.0), np.zeros((2, 1)), (0.02, 0.02), 6.0, True)
+
+
+def test_another_peak_of_a_test_does_not_choose_the_linearity_error() -> None:
+    """The least favourable one is that for the ratio of the two peaks, whatever other peaks are almost as large."""
+    sensors = SensorUncertainty(SensorAccuracy(), (0.2, 0.2), _calibrated())
+    bare, coupled, other = _reading(0.010, 1.0, 0.008), _reading(0.006, 1.0, 0.005), _reading(0.0059, -1.0, -0.006)
+    alone, beside = (sensors.shapes(seen) for seen in ([bare, coupled], [bare, coupled, other]))
+    assert alone.common is not None
+    assert beside.common is not None
+    assert beside.common.waves == alone.common.waves
+    np.testing.assert_allclose(beside.common.moments[:2, :2], alone.common.moments, rtol=1e-9)
+
+
+def test_the_first_storey_has_the_errors_of_the_reference_sensor_too() -> None:
+    sensors = SensorUncertainty(SensorAccuracy(), (0.2, 0.2), _calibrated())
+    seen = [_reading(0.010, 1.0, 0.02), _reading(0.006, 1.0, 0.015)]
+    draws = 40_000
+    own = sensors.linearity(0, seen, Draws(np.random.default_rng(1), draws)).std(axis=1)
+    # the same reading of laser and reference sensor has the same error; at rest, that of the laser alone remains
+    same, apart = (
+        sensors.u1_linearity(seen, table, Draws(np.random.default_rng(1), draws)).std(axis=1)
+        for table in ((0.02, 0.015), (0.0, 0.0))
+    )
+    np.testing.assert_allclose(same, own, rtol=0.02)
+    # at most the limit of an unfavourable curve, at its two places
+    added = np.sqrt(apart**2 - own**2)
+    assert (added > 0.1 * 1e-5).all()
+    assert (added < 2.0 * 1e-5).all()
+
+
+def test_cycles_with_the_fundamental_alone_are_no_check_of_the_lasers() -> None:
+    cycles, frame = _cycles(np.full(24, 0.02)), LinearFrame(Specimen().bare(), grounded=True)
+    assert steady_peak(cycles, 16.0, frame=frame).checks is None
 
 
 _READING = st.floats(-0.1, 0.1)
