@@ -16,8 +16,11 @@ from bench.datafile.hdf5 import clip_text
 from bench.datafile.reader import DataFile
 from bench.document.typography import counted
 from bench.events import Acquired, Event, PointFinished, SensorsAligned
+from bench.findings import FitFinished, SpecimenIdentified
 from bench.live_values import TwinEstimate
 from bench.replay.course import RecordedCourse
+from bench.replay.fits import differences_of_columns, parameter_rows, property_rows
+from sim.identified import Identified
 
 ROUNDING = 1e-9
 """Largest difference of results that is attributed to rounding on another processor or by another library, relative to
@@ -39,7 +42,7 @@ OF_INTERVALS = (
 )
 """Parts of the names of columns that depend on `bench.datafile.opening.INTERVALS`."""
 
-DRIVE, JOURNAL, POINTS, ENDING = "drive samples", "journal entries", "points", "ending"
+DRIVE, JOURNAL, POINTS, ENDING, FITS = "drive samples", "journal entries", "points", "ending", "fits"
 """Parts of a recording that are compared in addition to its other tables."""
 
 
@@ -71,6 +74,8 @@ class Comparison:
         self._points: list[Mapping[str, Any]] = []
         paths = (*(table.path for table in EVENT_TABLES.values()), *record.own_tables)
         self._own: dict[str, list[Mapping[str, Any]]] = {path: [] for path in paths}
+        self._fits: list[FitFinished] = []
+        self._identified: Identified | None = None
         self._entries = {path: kind for kind, path in ENTRY_PATHS.items()}
         """Kind of the journal entries of each table that has one row per entry, by the table's path."""
 
@@ -79,6 +84,10 @@ class Comparison:
             self._drive.push(event)
             self._blocks += 1
             return
+        if isinstance(event, FitFinished):
+            self._fits.append(event)
+        elif isinstance(event, SpecimenIdentified):
+            self._identified = event.identified
         if (table := event_table(type(event))) is not None:
             if event.journalled and table.single:
                 self._entries[table.path] = type(event).__name__
@@ -124,7 +133,27 @@ class Comparison:
             name = path.rpartition("/")[2].replace("_", " ")
             rounding = TWIN_ROUNDING if path == TwinEstimate.table else ROUNDING
             _compare_rows(found, name, stored[:common], rows[:common], *same, rounding)
+        if broken_off is None and self._course.same_intervals:
+            self._compare_fits(found)
         return found
+
+    def _compare_fits(self, found: Found) -> None:
+        """Compare fitted models and identified properties; those of another evaluation differ."""
+        stored, identified = self._record.fits, self._record.identified
+        if stored or self._fits:
+            _compare_rows(found, "fit parameters", parameter_rows(stored), parameter_rows(self._fits), True, True)
+        if identified or self._identified:
+            rows = property_rows(identified), property_rows(self._identified)
+            _compare_rows(found, "identified properties", *rows, True, True)
+        largest = 0.0
+        for name, apart in differences_of_columns(stored, self._fits):
+            if apart > ROUNDING:
+                found.differences.append(Difference(f"{name} differs by {apart:.1e} of the largest value", FITS))
+            else:
+                largest = max(largest, apart)
+        if largest > 0.0:
+            said = f"{FITS} differ by at most {largest:.1e} of the largest value"
+            found.differences.append(Difference(said, FITS, rounding=True))
 
     def _compare_journal(self, found: Found, broken_off: str | None) -> list[tuple[str, str, int]]:
         """Compare the entries in order: kind and text, or kind and number of preceding blocks if the wording differs.

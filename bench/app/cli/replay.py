@@ -122,7 +122,7 @@ def _text(replayed: "Replayed", table: str) -> str:
     if not replayed.same_wording:
         lines.append("The file is from an older version; the wording of its messages was not compared")
     if not replayed.same_intervals:
-        lines.append("The file is from an older version; its uncertainties were not compared")
+        lines.append("The file is from an older version; its uncertainties and fits were not compared")
     if replayed.identical:
         there = " up to its last sample" if replayed.ended is not None else ""
         lines.append(f"Bit-identical to the file{there}: {compared}")
