@@ -175,12 +175,15 @@ class SensorUncertainty:
 
     def shapes(self, seen: Sequence[PeakReadings]) -> "Shapes":
         """Errors of the peaks due to the unknown shapes of the linearity errors."""
+        lasers = self._shape(0, seen), self._shape(1, seen)
+        if self.calibration is None:
+            return Shapes(lasers)
         effects = list[Effect]()
         for each in seen:
             first, second = each.effect(0), each.effect(1)
             places = np.append(first.places, second.places)
             effects.append(Effect(places, np.append(-first.weights, second.weights)))
-        return Shapes((self._shape(0, seen), self._shape(1, seen)), self._common(effects, _shares(seen)))
+        return Shapes(lasers, self._common(effects, _shares(seen)))
 
     def _shape(self, laser: int, seen: Sequence[PeakReadings]) -> LinearityErrors | None:
         """Linearity errors of laser 0 or 1; for a calibrated laser, only those outside the calibrated range, None if no
