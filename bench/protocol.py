@@ -193,13 +193,15 @@ class RunView:
     """Display of a run. `headline` is the field of a point whose value, prediction and verdict are shown largest, by
     default the first field with an uncertainty. `labels` are the printed names of fields of a point, such as
     "restitution rₑₓₚ"; a field without a label is shown with the first words of its description. `matrix` has the axes
-    of the rows and the columns in which the points are arranged, if the values on them are known before the run. `live`
-    returns the live view of the window for a `bench.live_view.LiveRun`; the default is `bench.live_view.standard_view`.
+    of the rows and the columns in which the points are arranged, if the values on them are known before the run;
+    `by_columns` tells that the points of a column are measured one after the other, not those of a row. `live` returns
+    the live view of the window for a `bench.live_view.LiveRun`; the default is `bench.live_view.standard_view`.
     """
 
     headline: str = ""
     labels: Mapping[str, str] = field(default_factory=dict[str, str])
     matrix: tuple[Axis, Axis] | None = None
+    by_columns: bool = False
     live: "Live | None" = None
 
 

@@ -212,6 +212,7 @@ PROTOCOL = Protocol(
         headline="alpha_2",
         labels={"alpha_1": "α₁", "alpha_2": "α₂"},
         matrix=(Axis("records", "record"), Axis("beta", "beta", "β {:g}")),
+        by_columns=True,
         live=deferred("protocols.earthquake.live:seismic_view"),
     ),
 )

@@ -32,8 +32,8 @@ class Campaign:
     """
 
     def __init__(self, protocol: Protocol[Any], run: Run) -> None:
-        self._axes = protocol.view.matrix
-        self._headline = protocol.view.headline
+        self._axes, self._by_columns = protocol.view.matrix, protocol.view.by_columns
+        self._headline, self._paced = protocol.view.headline, run.paced
         self.rows, self.columns = ([], []) if self._axes is None else (self._values(axis, run) for axis in self._axes)
         self.cells: dict[Place, Cell] = {}
         self.current: Place | None = None
@@ -51,8 +51,9 @@ class Campaign:
 
     @property
     def waiting(self) -> list[Place]:
-        """Points that have not begun, in order."""
-        return [place for place, cell in self.cells.items() if cell.status == texts.POINT_WAITS]
+        """Points that have not begun, in the order in which they are measured."""
+        found = [place for place, cell in self.cells.items() if cell.status == texts.POINT_WAITS]
+        return sorted(found, key=lambda place: place[::-1]) if self._by_columns else found
 
     def follow(self, event: Event) -> None:
         """Update the points with an event."""
@@ -81,10 +82,11 @@ class Campaign:
 
     def expected(self, place: Place, remaining: float, now: datetime) -> datetime | None:
         """Estimated end of a point, on the assumption that all unfinished points take equal parts of the `remaining`
-        time [s]; None for a finished point, or if `remaining` is not finite.
+        time [s]; None for a finished point, if `remaining` is not finite, or if the bench does not run in real time,
+        because `remaining` is its own time.
         """
         left = [*([] if self.current is None else [self.current]), *self.waiting]
-        if place not in left or not isfinite(remaining):
+        if place not in left or not isfinite(remaining) or not self._paced:
             return None
         return now + timedelta(seconds=remaining * (left.index(place) + 1) / len(left))
 

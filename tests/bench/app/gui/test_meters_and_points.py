@@ -26,6 +26,8 @@ from bench.guard.motion import WATCHED, MotionWatch
 from bench.live_values import Estimate
 from bench.preflight.margins import Demand, bounds, margins
 from drivers.rig import Channel
+from protocols.earthquake.protocol import PROTOCOL as EARTHQUAKE
+from protocols.earthquake.protocol import EarthquakeParameters
 from protocols.free_rocking.protocol import PROTOCOL as FREE_ROCKING
 from protocols.harmonic.protocol import PROTOCOL as HARMONIC
 from protocols.harmonic.protocol import HarmonicParameters, HarmonicPoint, PointStatus
@@ -100,6 +102,17 @@ def test_the_matrix_has_each_point_with_its_state_and_end() -> None:
     campaign.follow(PointFinished(steady, time=3.0))
     assert (campaign.cells[0, 0].status, campaign.cells[0, 1].result) == ("overturned", "0.1879")
     assert campaign.expected((0, 0), 400.0, now) is None
+
+
+def test_points_measured_by_columns_are_expected_in_that_order_and_only_in_real_time() -> None:
+    """An earthquake campaign plays all records before it changes the spring."""
+    parameters = EarthquakeParameters(records=("synthetic:kobe", "synthetic:pacoima"), beta=(0.25, 0.4))
+    now = datetime(2026, 1, 1, 12, 0)
+    for realtime in (True, False):
+        campaign = Campaign(EARTHQUAKE, replace(order(Path("never"), realtime=realtime), parameters=parameters))
+        assert campaign.waiting == [(0, 0), (1, 0), (0, 1), (1, 1)]
+        found = campaign.expected((1, 0), 400.0, now)
+        assert found == (datetime(2026, 1, 1, 12, 3, 20) if realtime else None)
 
 
 def test_the_verdict_is_one_sentence() -> None:
