@@ -39,6 +39,10 @@ SOURCES: Mapping[str, Source] = {
         "B", "scale of the accelerometer, times the predicted slope of the gain", "calibrate the accelerometer"
     ),
     "noise of the peaks": Source("A", "residual of the signals around the peaks", "repeat the test"),
+    "choice of the largest peak": Source("B", "linearity of the lasers at peaks of almost the same size", _CALIBRATE),
+    "pairs that are not fitted": Source(
+        "A", "change of the fit without its first cycles", "observe more cycles after the release"
+    ),
     "noise of the table's motion": Source(
         "A", "simulations with the noise of the accelerometer at rest", "use an accelerometer with less noise"
     ),

@@ -7,7 +7,10 @@ import pytest
 from bench.analysis.contributions import SOURCES, largest_improvement
 from bench.analysis.free_decay.covariance import COMMON, OWN
 from bench.analysis.free_rocking.findings import Combined
+from bench.analysis.multiplier import Multiplier
 from bench.analysis.uncertainty import Budget, combined_freedom
+from protocols.earthquake.uncertainty import CHOICE
+from protocols.stability.release import parts_of
 
 
 def test_the_example_of_the_gum_gives_its_degrees_of_freedom() -> None:
@@ -32,6 +35,12 @@ def test_the_improvement_is_the_contribution_with_the_largest_variance_of_all_re
 def test_the_contributions_of_decays_and_of_the_block_have_an_origin() -> None:
     block = Combined(value=1.0, noise=0.0, timing=0.0, linearity=0.0, scale=0.0, scatter=0.0, birge=1.0)
     assert {*OWN, *COMMON, *block.parts()} <= SOURCES.keys()
+
+
+def test_the_contributions_of_records_and_of_released_motions_have_an_origin() -> None:
+    found = Multiplier(1.02, 1e-3, 2.8, 1e-3, 0.0, 1e-3, 1e-3, 60, 1, 0.0, 1.0, 1e-6)
+    released = parts_of(found, (0.1, 0.01), 0.005)
+    assert {CHOICE, *released} <= SOURCES.keys()
 
 
 def test_a_budget_states_few_degrees_of_freedom_only() -> None:
