@@ -186,10 +186,11 @@ class Driver:
         if whole:
             self._expired.add(parts[0].name)
             error = DAQmxErrors.CHASSIS_WATCHDOG_TIMER_EXPIRED
-        for part in parts:
-            self.lines.expire(part.name, {line: lines[line] for line in part.line_names if line in lines}, error)
+        # the outputs first: when the relay is open, the drive is at zero
         for output, value in volts.items():
             self.terminals[output].hold(value)
+        for part in parts:
+            self.lines.expire(part.name, {line: lines[line] for line in part.line_names if line in lines}, error)
 
     def lose_network(self) -> None:
         """Simulate a lost network connection to every chassis; watchdogs configured to do so expire."""
