@@ -38,7 +38,7 @@ ROWS_AT_ONCE = 2**16
 OF_INTERVALS = (
     *("uncertainty", "dominating", "degrees_of_freedom", "agrees"),
     *("alpha_1_low", "alpha_1_high", "alpha_2_low", "alpha_2_high", "alpha_2_least", "alpha_2_mean"),
-    *("alpha_2_greatest_low", "alpha_2_greatest_high"),
+    *("alpha_2_greatest_low", "alpha_2_greatest_high", "falls_predicted", "repeats_cycles"),
 )
 """Parts of the names of columns that depend on `bench.datafile.opening.INTERVALS`."""
 

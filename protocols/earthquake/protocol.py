@@ -48,7 +48,8 @@ class EarthquakeParameters(Parameters):
     longest: float = quantity(
         100.0,
         "s",
-        "longest played duration; of a longer record, the part with the largest Arias intensity is played",
+        "longest duration taken from a record, before its time is scaled by length_ratio; of a longer record, the part "
+        "with the largest Arias intensity is played",
         ge=5,
         le=3600,
     )

@@ -3,7 +3,6 @@
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from math import sqrt
 from typing import Any
 
 import numpy as np
@@ -228,8 +227,7 @@ def shakings(
 def _shaking(record: Accelerogram, parameters: EarthquakeParameters, configuration: BenchConfiguration) -> Shaking:
     specimen = configuration.known_specimen
     try:
-        # the duration is that of the scaled record: time scales with the square root of the length
-        part, begin = _strongest(record.sampled, parameters.longest / sqrt(parameters.length_ratio))
+        part, begin = _strongest(record.sampled, parameters.longest)
         prepared = prepare(
             part,
             band=band_used(parameters, configuration),

@@ -87,7 +87,7 @@ def _numbers(motion: LongTerm) -> dict[str, Any]:
 
 def _remark(found: dict[str, Any], outside: list[str]) -> str:
     names = " and ".join(outside) if len(outside) < 3 else "least, mean and greatest"
-    apart = f"; outside the predicted intervals: the measured {names} peak" if outside else ""
+    apart = f"; outside the predicted intervals: the measured {names} peak{'s' * (len(outside) > 1)}" if outside else ""
     if found["greatest"] is None:
         return f"the model's free motion ends with a fall of the block{apart}"
     repeats = f"repeats every {found['repeats']} cycles" if found["repeats"] else "does not repeat"

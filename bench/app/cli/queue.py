@@ -144,8 +144,8 @@ def _run_one(
                 if ended.status == "completed" and not ended.passed
                 else f"{ended.status}: {ended.reason}"
             )
-            # an interrupt after the end of the plan does not change the ending
-            if ended.status == "completed" and good and interrupted is None:
+            # an interrupt after the end of the plan does not change the ending, but ends the queue
+            if ended.status == "completed" and good and (interrupted is None or tests.next is None):
                 return None
     except InvalidInput as refused:
         outcome = f"refused: {refused}"

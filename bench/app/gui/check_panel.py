@@ -91,9 +91,7 @@ class CheckPanel(QWidget):
         self.person.setChecked(not configuration.serves_itself)
         self.person.setEnabled(configuration.serves_itself)
         self.person.setToolTip(texts.ASK_TIP if configuration.serves_itself else texts.ASK_CHECK_TIP)
-        self._say(texts.CHECK_LOOP_IDLE, "calm")
-        self.lines.clear()
-        self.table.setRowCount(0)
+        self._clear()
 
     def start(self) -> None:
         """Run the check."""
@@ -108,6 +106,11 @@ class CheckPanel(QWidget):
         person = self.person.isChecked()
         self.predicted.emit({})
         self._controller.start(Run(CHECK, load_protocol(CHECK).parameters(), self._configuration, out, person=person))
+
+    def _clear(self) -> None:
+        self._say(texts.CHECK_LOOP_IDLE, "calm")
+        self.lines.clear()
+        self.table.setRowCount(0)
 
     def use_theme(self, theme: Theme) -> None:
         self._theme = theme
@@ -173,7 +176,7 @@ class CheckPanel(QWidget):
         if self._ours and not self._controller.running:
             # the window was detached from the run
             self._ours = False
-            self._say(texts.CHECK_LOOP_IDLE, "calm")
+            self._clear()
         why = self._why_not
         self.check.setEnabled(not why)
         self.check.setToolTip(why or texts.CHECK_LOOP_TIP)

@@ -46,7 +46,7 @@ class RunPage(QWidget):
 
     def __init__(self, controller: Controller, theme: Theme) -> None:
         super().__init__()
-        self._controller = controller
+        self._controller, self._running = controller, False
         self.traces, self.live, self.steady = TracePlot(theme), LiveViewArea(theme), SteadyView()
         self.gains = self.live.gains
         self.motion = tuple(MotionPlot(theme, kind) for kind in KINDS)
@@ -70,7 +70,6 @@ class RunPage(QWidget):
         controller.event_received.connect(self._tell)
         controller.changed.connect(self._refresh)
         controller.began.connect(self._begin)
-        controller.ended.connect(self._end)
         self._timer = QTimer(self, interval=PERIOD, timerType=Qt.TimerType.PreciseTimer)
         self._timer.timeout.connect(self._draw)
         self._timer.start()
@@ -218,7 +217,7 @@ class RunPage(QWidget):
                 pass
 
     def _end(self) -> None:
-        """Show that nothing is being measured any more."""
+        """Show that nothing is being measured any more: the run has ended, or the window was detached from it."""
         self.steady.finish()
         self.matrix.end()
         self.live.end_step()
@@ -227,6 +226,9 @@ class RunPage(QWidget):
         self.verdict.show_sentence(self.contents.sentence)
 
     def _refresh(self) -> None:
+        was_running, self._running = self._running, self._controller.running
+        if was_running and not self._running:
+            self._end()
         events, traces = self._controller.session.lost
         lost = [text.format(n=n) for n, text in zip((events, traces), texts.LOST_PARTS, strict=True) if n]
         said = [texts.LOST.format(what=texts.AND.join(lost))] if lost else []

@@ -2,24 +2,16 @@
 
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import pytest
 
 from bench.accelerograms.accelerogram import Accelerogram
-from bench.config.model import BenchConfiguration
-from bench.control.preparation import PreparedMotion, prepare
 from bench.control.table_model import TableModel
 from bench.datafile.reader import open_datafile
 from bench.datafile.recorder import Recorder
 from bench.testing.loopback import LoopbackRig
-from protocols.earthquake import records
-from protocols.earthquake.protocol import EarthquakeParameters, EarthquakePoint
-from protocols.earthquake.records import FileSources, shakings
-from sim.excitation import SampledRecord
-
-LOW = BenchConfiguration()
+from protocols.earthquake.protocol import EarthquakePoint
+from protocols.earthquake.records import FileSources
 
 
 def record(name: str, n: int, dt: float, synthetic: bool) -> Accelerogram:
@@ -59,24 +51,6 @@ def test_records_and_table_model_come_back_to_the_last_bit(tmp_path: Path) -> No
         assert now.acceleration.tobytes() == was.acceleration.tobytes()
         for name in ("name", "dt", "source", "format", "unit", "sha256", "header", "synthetic"):
             assert getattr(now, name) == getattr(was, name)
-
-
-@pytest.mark.parametrize("length_ratio", [1.0, 0.25])
-def test_the_longest_duration_is_that_of_the_played_record(
-    length_ratio: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Time scales with the square root of the length: 5 s of a quarter of the length are 10 s of the record."""
-    parts = list[SampledRecord]()
-
-    def noted(part: SampledRecord, **settings: Any) -> PreparedMotion:
-        parts.append(part)
-        return prepare(part, **settings)
-
-    monkeypatch.setattr(records, "prepare", noted)
-    shakings(EarthquakeParameters(records=("synthetic:kobe",), longest=5.0, length_ratio=length_ratio), LOW)
-    (part,) = parts
-    duration = (part.acceleration.size - 1) * part.dt
-    assert duration * length_ratio**0.5 == pytest.approx(5.0, abs=2.0 * part.dt)
 
 
 def test_a_file_of_before_has_none_and_a_campaign_without_a_model_has_no_model(tmp_path: Path) -> None:
