@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from drivers.clock import WallClock, now
 from drivers.emulation.optoncdt.laser import EmulatedLaser
-from drivers.errors import RigError
+from drivers.errors import ConnectionLost, RigError
 from drivers.hardware.parameters import Hardware, Laser1, Laser2, Lasers
 from drivers.hardware.tracks import MARKS, Track, Tracks, open_serial_lasers
 from drivers.optoncdt.codec import LATE
@@ -17,7 +17,7 @@ from drivers.optoncdt.stream import Readings
 from drivers.rig import Channel
 from drivers.timebase.sensor_track import SensorTrack
 from sim.sensors import Laser
-from tests.patience import LONG
+from tests.patience import LONG, eventually
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="emulated serial lasers need pseudo-terminals")
 
@@ -108,6 +108,20 @@ def test_a_short_block_waits_for_half_its_duration_at_most(
     waits = [run.block()[1] for _ in range(25)]
     # half of 20 ms, and what a busy machine takes; not 50 ms
     assert 0.009 < np.median(waits) < 0.035
+
+
+def test_a_laser_that_was_unplugged_before_the_arming_prevents_it(
+    emulated: tuple[EmulatedLaser, EmulatedLaser], lasers: Tracks
+) -> None:
+    """Although values from before are still held."""
+    lasers.begin(RATE, WallClock())
+    WallClock().wait_until(now() + 0.2)
+    emulated[1].unplug()
+    # the process that reads the port notices it
+    sensor = lasers._tracks[1].sensor
+    eventually(lambda: sensor._stream._failure is not None)
+    with pytest.raises(ConnectionLost, match="laser_2"):
+        lasers.begin(RATE, WallClock())
 
 
 def test_blocks_before_a_run_are_refused_as_such(lasers: Tracks) -> None:
