@@ -167,7 +167,9 @@ class SpecimenKnowledge(SpecimenUncertainty):
         """Correlation matrix, shape (n, n), and relative standard uncertainties of the findings."""
         findings = list(measured.values())
         matrix = self.identified.correlation([finding.name for finding in findings])
-        return matrix, [finding.standard_uncertainty / finding.value for finding in findings]
+        # a factor has no effect on a quantity that is zero
+        relative = [each.standard_uncertainty / each.value if each.value else 0.0 for each in findings]
+        return matrix, relative
 
 
 def root_of(matrix: Floats) -> Floats:

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from sim.identified import Correlation, Finding, Identified
 from sim.knowledge import SpecimenKnowledge
-from sim.specimen import Specimen
+from sim.specimen import Frame, Specimen
 
 DATE = datetime(2026, 11, 20, tzinfo=UTC)
 
@@ -42,6 +42,12 @@ BEST = MEASURED.identified.applied(Specimen()).coupled(0.64)
 def numbers(specimen: Specimen) -> list[float]:
     frame = specimen.frame
     return [frame.m1, frame.k1, frame.k2, frame.xi1, specimen.block.restitution_factor, specimen.k_c]
+
+
+def test_a_quantity_that_was_measured_as_zero_stays_zero() -> None:
+    known = identified({"xi1": (0.0, 0.001), "k1": (213.0, 1.0)})
+    undamped = Specimen(frame=Frame(xi1=0.0))
+    assert {each.frame.xi1 for each in known.draws(undamped, 5, np.random.default_rng(1))} == {0.0}
 
 
 def test_measured_quantities_are_drawn_with_their_covariance_and_the_others_within_their_half_widths() -> None:

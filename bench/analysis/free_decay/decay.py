@@ -20,6 +20,9 @@ Array = NDArray[np.float64]
 LET_GO = 0.2
 """Time excluded after the start of a release [s], in which the operator's hand leaves the storey."""
 
+SHORTEST = 2.0
+"""Shortest recording of a decay [s] after that time."""
+
 _HELD = 0.5
 """Time from the start of a recording during which the storey is assumed to be held [s]."""
 
@@ -77,6 +80,11 @@ def released_decay(signals: Array, setting: Setting) -> Decay:
     # a locked table does not move: its sensor measures only noise
     stretch = stretch_of(np.zeros(len(signals)), seen, setting.sample_rate, on_table=setting.on_table)
     begin = _released(stretch) + LET_GO
+    left = float(stretch.time[-1]) - begin
+    if left < SHORTEST:
+        raise Unusable(
+            f"the storey was released {max(left, 0.0):.1f} s before the end of the recording: release it earlier"
+        )
     return _decay(stretch.from_time(begin), setting, 0.0, begin)
 
 

@@ -113,6 +113,10 @@ def find_swings(seen: Recording, least: float) -> Swings:
     peaks = np.array([_largest(angle[low:high]) for low, high in zip(after, ends, strict=True)])
     small = np.flatnonzero(np.abs(peaks) < least)
     count = int(small[0]) if small.size else peaks.size
+    if count == 0:
+        raise NotRocking(
+            f"the block was lowered by hand, and swung to {peaks[0]:+.4f} rad only: let it go, then repeat"
+        )
     return Swings(zero, held, crossings[:count] / seen.sample_rate, peaks[:count])
 
 

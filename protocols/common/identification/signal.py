@@ -29,6 +29,9 @@ FADE = 0.25
 _LEFT = 0.02
 """Fraction of the specimen's transient that remains at the start of the first used period."""
 
+_UNDAMPED = 1e-9
+"""Largest decay rate of a mode, relative to its frequency, that is due to rounding."""
+
 
 @dataclass(frozen=True, eq=False)
 class Grid:
@@ -92,7 +95,7 @@ def grid(parameters: IdentifyParameters, configuration: BenchConfiguration, spec
     first = int(np.searchsorted(lines * spacing, low * (1.0 + 1e-9), side="right")) - 1
     last = int(np.searchsorted(lines * spacing, high * (1.0 - 1e-9)))
     lines = lines[max(first, 0) : last + 1]
-    discarded = parameters.discarded or max(ceil(_settling(specimen) / parameters.period - FADE), 1)
+    discarded = parameters.discarded or max(ceil(settling(specimen) / parameters.period - FADE), 1)
     return Grid(lines, samples, rate, discarded, parameters.periods)
 
 
@@ -140,9 +143,16 @@ def measured_peak(motion: Complex, grid: Grid, knee: float) -> float:
     return float(np.abs(waveform(grid.lines[seen], motion[seen], grid.samples)).max())
 
 
-def _settling(specimen: Specimen) -> float:
-    """Time [s] in which the slowest motion of the specimen, with a resting block, decays to the fraction `_LEFT`."""
-    return log(_LEFT) / float(resting_rates(specimen).real.max())
+def settling(specimen: Specimen) -> float:
+    """Time [s] in which the slowest motion of the specimen, with a resting block, decays to the fraction `_LEFT`.
+    Raises InvalidInput if it does not decay.
+    """
+    rates = resting_rates(specimen)
+    slowest = -float(rates.real.max())
+    if slowest < _UNDAMPED * float(np.abs(rates).max()):
+        needs = "a mode of the specimen is not damped, so its motion never settles: specify the number of periods"
+        raise InvalidInput("discarded", None, needs)
+    return -log(_LEFT) / slowest
 
 
 SHARE = 0.75

@@ -234,3 +234,7 @@ def test_what_tells_nothing_is_refused() -> None:
     still = np.random.default_rng(2).normal(0.0, 1e-5, signals.shape)
     with pytest.raises(Unusable, match="no release was found"):
         released_decay(still, setting())
+    late = still.copy()
+    late[-1000:, 5] += 0.01
+    with pytest.raises(Unusable, match=r"released 0\.\d s before the end of the recording: release it earlier"):
+        released_decay(late, setting())

@@ -11,10 +11,11 @@ from bench.analysis.free_rocking.findings import LaserErrors, Tilt, analyse_tilt
 from bench.analysis.free_rocking.fit import ALPHA as ALPHA_ROW
 from bench.analysis.free_rocking.fit import BEND_2, START, P, R
 from bench.analysis.free_rocking.points import find_points, functional_uncertainty
-from bench.analysis.free_rocking.swings import NotRocking, find_swings
+from bench.analysis.free_rocking.swings import NotRocking, Recording, find_swings
 from bench.analysis.gain import SensorAccuracy
+from sim import block_face
 from sim.free_rocking import FreeRocking
-from tests.rocking import ALPHA, HEIGHT, R_TH, RATE, SPECIMEN, Shown, motion, recording
+from tests.rocking import ALPHA, BLOCK, HEIGHT, R_TH, RATE, SPECIMEN, Shown, motion, recording
 from tests.rocking import P as P_TRUE
 
 LEAST = 0.006
@@ -36,6 +37,14 @@ def test_impacts_and_turning_points_are_where_the_closed_form_has_them() -> None
     known = (true.sides * true.amplitudes)[1 : count + 1]
     np.testing.assert_allclose(points.amplitudes, known, rtol=2e-5)
     assert swings.held == pytest.approx(true.tilt, rel=1e-5)
+
+
+def test_a_block_that_was_lowered_by_hand_is_refused_although_it_swung_to_the_other_side() -> None:
+    times = np.arange(0.0, 8.0, 1.0 / RATE)
+    angle = np.interp(times, [0.0, 2.0, 4.0, 4.5], [0.06, 0.06, -0.5 * LEAST, 0.0])
+    seen = Recording(block_face.displacement(angle, HEIGHT, BLOCK), RATE, BLOCK, HEIGHT)
+    with pytest.raises(NotRocking, match=r"lowered by hand, and swung to -0\.0030 rad only: let it go"):
+        analyse_tilt(seen, SPECIMEN, LEAST)
 
 
 @pytest.mark.parametrize("share", [0.35, -0.6])

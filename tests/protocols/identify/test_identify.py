@@ -25,7 +25,7 @@ from bench.preflight.demands import response_of
 from bench.preflight.motion import RESTING, resting_demands
 from bench.results import FILE
 from protocols.common.identification.parameters import IdentifyParameters
-from protocols.common.identification.signal import BLOCK_SHARE, SHARE, grid, planned
+from protocols.common.identification.signal import BLOCK_SHARE, SHARE, grid, planned, settling
 from protocols.identify.protocol import IdentifiedBand
 from sim.errors import InvalidInput
 from sim.excitation import SampledRecord
@@ -126,6 +126,12 @@ def test_file_model_and_summary_say_the_same(identified: Identified) -> None:
     assert result.table.splitlines()[3].split()[0] == "0.5"
     assert (out / "table_response.png").stat().st_size > 20_000
     assert sum(isinstance(event, TableIdentified) for event in events) == 1
+
+
+def test_an_undamped_specimen_needs_a_number_of_discarded_periods() -> None:
+    with pytest.raises(InvalidInput, match=r"discarded.*not damped.*specify the number of periods"):
+        settling(Specimen(frame=Frame(xi1=0.0)))
+    assert settling(Specimen()) > 0.0
 
 
 def test_the_identified_table_is_loaded_by_other_runs_at_its_own_rate_only(identified: Identified) -> None:
