@@ -137,7 +137,7 @@ class SensorUncertainty:
         computed.
         """
         found = self.shapes(seen) if shapes is None else shapes
-        first, second = (self._linearity(laser, found.lasers[laser], len(seen), draws) for laser in (0, 1))
+        first, second = (self._linearity(laser, found.lasers[laser], seen, draws) for laser in (0, 1))
         common = 0.0 if found.common is None else found.common.draws(draws.normal(len(seen)))
         errors = {LINEARITY: second - first + common}
         mismatch = self.accuracy.laser_mismatch
@@ -152,7 +152,7 @@ class SensorUncertainty:
 
     def linearity(self, laser: int, seen: Sequence[PeakReadings], draws: "Draws") -> Array:
         """Errors [m] of the peaks due to the linearity of laser 0 or 1, in each test, shape (tests, n)."""
-        return self._linearity(laser, self._shape(laser, seen), len(seen), draws)
+        return self._linearity(laser, self._shape(laser, seen), seen, draws)
 
     def u1_linearity(self, seen: Sequence[PeakReadings], table: Sequence[float], draws: "Draws") -> Array:
         """Errors [m] of the peaks of u1 due to the linearity of laser 0 and, if it is calibrated, of the calibration's
@@ -165,12 +165,16 @@ class SensorUncertainty:
         common = self._common(effects, _shares(seen))
         return errors if common is None else errors + common.draws(draws.normal(len(seen)))
 
-    def _linearity(self, laser: int, shape: LinearityErrors | None, tests: int, draws: "Draws") -> Array:
-        normal = draws.normal(tests)
+    def _linearity(
+        self, laser: int, shape: LinearityErrors | None, seen: Sequence[PeakReadings], draws: "Draws"
+    ) -> Array:
+        normal = draws.normal(len(seen))
         if self.calibration is None:
             assert shape is not None
             return shape.draws(normal)
-        errors = self.calibration.lasers[laser].uncertainty * draws.normal(tests)
+        # a zero at rest has the error of the curve there; that of a cycle is its mean, which the calibration removes
+        readings = np.array([[2.0 if each.at_rest else 1.0] for each in seen])
+        errors = np.sqrt(readings) * self.calibration.lasers[laser].uncertainty * draws.normal(len(seen))
         return errors if shape is None else errors + shape.draws(normal)
 
     def shapes(self, seen: Sequence[PeakReadings]) -> "Shapes":

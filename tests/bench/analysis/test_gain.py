@@ -207,6 +207,14 @@ def test_the_first_storey_has_the_errors_of_the_reference_sensor_too() -> None:
     assert (added < 2.0 * 1e-5).all()
 
 
+def test_a_zero_at_rest_has_an_error_of_the_calibrated_curve_too() -> None:
+    sensors = SensorUncertainty(SensorAccuracy(), (0.2, 0.2), _calibrated())
+    at_rest = _reading(0.010, 1.0, 0.008)
+    seen = [at_rest, replace(at_rest, at_rest=False)]
+    found = sensors.linearity(0, seen, Draws(np.random.default_rng(1), 40_000)).std(axis=1)
+    np.testing.assert_allclose(found, [3e-6 * np.sqrt(2.0), 3e-6], rtol=0.02)
+
+
 def test_cycles_with_the_fundamental_alone_are_no_check_of_the_lasers() -> None:
     cycles, frame = _cycles(np.full(24, 0.02)), LinearFrame(Specimen().bare(), grounded=True)
     assert steady_peak(cycles, 16.0, frame=frame).checks is None
