@@ -68,23 +68,6 @@ def student_factor(number: int) -> float:
     return float(stdtrit(number - 1, _LEVEL) / ndtri(_LEVEL)) if number > 1 else 0.0
 
 
-def next_value(values: ArrayLike) -> tuple[Array, Array]:
-    """Ends of the intervals that contain the next value of n normally distributed quantities with 95 %, each of shape
-    (n,): mean -+ t s sqrt(1 + 1 / R) of R earlier `values`, shape (R, n), with Student's t for R - 1 degrees of freedom
-    (Hahn and Meeker, Statistical Intervals, 1991: prediction interval). NaN for fewer than two earlier values.
-    """
-    from scipy.special import stdtrit
-
-    found = np.asarray(values, dtype=np.float64)
-    number = len(found)
-    if number < 2:
-        absent = np.full(found.shape[1:], np.nan)
-        return absent, absent
-    mean, spread = found.mean(axis=0), found.std(axis=0, ddof=1)
-    half = float(stdtrit(number - 1, _LEVEL)) * np.sqrt(1.0 + 1.0 / number) * spread
-    return mean - half, mean + half
-
-
 def _weights(variances: Array) -> Array:
     return (1.0 / variances) / np.sum(1.0 / variances, axis=0)
 

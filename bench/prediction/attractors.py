@@ -7,7 +7,6 @@ from math import nan
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.analysis.uncertainty import next_value
 from bench.datafile.tables import Column, Table
 from bench.prediction.requests import AttractorRequest
 from bench.prediction.steady import predict_spectra
@@ -25,7 +24,13 @@ from sim.table_orbit import table_orbit
 SEED = 1
 """Seed of the drawn specimens, fixed so that predictions are reproducible."""
 
-CYCLES, MEMBERS = 1500, 16
+CYCLES = 1500
+
+MEMBERS, MEMBER_CYCLES = 39, 600
+"""Number of drawn specimens, and largest number of cycles for which the motion of each is followed, about as long as a
+test. A further specimen lies between the smallest and the largest of n with the probability (n - 1) / (n + 1), whatever
+their distribution: 95 % for 39.
+"""
 
 PEAKS = "gain of the largest drift within one period, over all positions of the period"
 """Beginning of the descriptions of least, mean and greatest peak."""
@@ -40,9 +45,8 @@ class LongTerm:
     does not repeat, or if the block falls. `gains`, shape (n,), are the gains of the peaks of the last cycles, without
     entries if the block falls, which happens after `fallen` cycles. `least`, `mean` and `greatest` are the gains of the
     largest drift within a period that slides over these cycles, NaN if the block falls. `low` and `high`, shape (3,),
-    are the ends of the intervals that contain these three gains of a further specimen, whose block does not fall, with
-    95 %; NaN if the blocks of fewer than two drawn specimens do not fall. `falls` is the fraction of drawn specimens
-    whose block falls, NaN without any.
+    are the smallest and largest values of these three gains among the drawn specimens whose block does not fall, NaN
+    with fewer than two. `falls` is the fraction of drawn specimens whose block falls, NaN without any.
     """
 
     omega: float
@@ -69,8 +73,8 @@ def long_term(
     cycles: int = CYCLES,
     members: int = MEMBERS,
 ) -> LongTerm:
-    """Long-term motion, `cycles` cycles after a start near the rocking orbit of `branch`, for its specimen and for
-    `members` specimens drawn from `known`; the orbit itself if it is stable on the table.
+    """Long-term motion, `cycles` cycles after a start near the rocking orbit of `branch`, for its specimen and, after
+    at most `MEMBER_CYCLES`, for `members` specimens drawn from `known`; the orbit itself if it is stable on the table.
 
     The amplitude of the table's acceleration and its harmonics up to number `harmonics` are held at those of the orbit.
     Raises NoOrbit if there is no such orbit on the table.
@@ -81,14 +85,16 @@ def long_term(
         gain, absent = branch.alpha_2, np.full(3, nan)
         return LongTerm(fixed.omega, beta, gain, True, np.array([gain]), gain, gain, gain, 1, absent, absent)
 
-    def motions(specimen: Specimen) -> tuple[float, Attractor]:
+    def motions(case: tuple[Specimen, int]) -> tuple[float, Attractor]:
+        specimen, length = case
         bare = steady_peaks(specimen.bare(), fixed.omega, fixed.amplitude).drift
-        return bare, attractor(specimen, shaker, orbit, cycles)
+        return bare, attractor(specimen, shaker, orbit, length)
 
     drawn = known.draws(fixed.specimen, members, np.random.default_rng(SEED))
-    (bare, motion), *others = in_threads(motions, [fixed.specimen, *drawn])
-    kept = [np.array(other.within) / each for each, other in others if other.fallen is None]
-    low, high = next_value(np.reshape(kept, (-1, 3)))
+    shorter = min(cycles, MEMBER_CYCLES)
+    (bare, motion), *others = in_threads(motions, [(fixed.specimen, cycles), *((each, shorter) for each in drawn)])
+    kept = np.array([np.array(other.within) / each for each, other in others if other.fallen is None])
+    low, high = (kept.min(axis=0), kept.max(axis=0)) if len(kept) > 1 else (np.full(3, nan), np.full(3, nan))
     falls = 1.0 - len(kept) / len(others) if others else nan
     least, mean, most = (each / bare for each in motion.within)
     return LongTerm(
@@ -101,7 +107,7 @@ def long_term(
         mean=mean,
         greatest=most,
         repeats=motion.repeats,
-        low=np.maximum(low, 0.0),
+        low=low,
         high=high,
         fallen=motion.fallen,
         falls=falls,
@@ -151,12 +157,12 @@ def attractors_table(found: Sequence[LongTerm]) -> Table:
             f"{name}_{end}": numbers(
                 [values[k] for values in ends],
                 "1",
-                f"{side} end of the interval that contains alpha_2_{name} of a further specimen with 95 %",
+                f"{side} value of alpha_2_{name} among the drawn specimens",
             )
             for k, name in enumerate(("least", "mean", "greatest"))
             for end, side, ends in (
-                ("low", "lower", [each.low for each in found]),
-                ("high", "upper", [each.high for each in found]),
+                ("low", "smallest", [each.low for each in found]),
+                ("high", "largest", [each.high for each in found]),
             )
         },
         "falls": numbers([each.falls for each in found], "1", "fraction of the drawn specimens whose block falls"),

@@ -160,9 +160,10 @@ class AttractorRequest(OnTableRequest, OrbitsRequest):
         le=100_000,
     )
     members: int = quantity(
-        16,
+        39,
         "1",
-        "number of specimens drawn for the ranges of the peaks and the fraction of falls",
+        "number of specimens drawn for the ranges of the peaks and the fraction of falls, each followed for at most "
+        "600 cycles",
         ge=0,
         le=10_000,
     )

@@ -4,6 +4,7 @@ from math import hypot, isfinite
 from typing import Any
 
 from bench.config.model import BenchConfiguration
+from bench.prediction import attractors
 from bench.prediction.attractors import CYCLES, LongTerm, long_term
 from bench.result_cache import cached
 from protocols.harmonic.protocol import HarmonicPoint
@@ -11,7 +12,7 @@ from sim.gain import predict_gain
 from sim.specimen import Specimen
 from sim.steady import NoOrbit
 
-MEMBERS = 8
+MEMBERS = attractors.MEMBERS
 """Number of specimens drawn, within the uncertainty, for the ranges of the peaks."""
 
 PEAKS = ("least", "mean", "greatest")
@@ -87,12 +88,12 @@ def _numbers(motion: LongTerm) -> dict[str, Any]:
 
 def _remark(found: dict[str, Any], outside: list[str]) -> str:
     names = " and ".join(outside) if len(outside) < 3 else "least, mean and greatest"
-    apart = f"; outside the predicted intervals: the measured {names} peak{'s' * (len(outside) > 1)}" if outside else ""
+    apart = f"; outside the predicted ranges: the measured {names} peak{'s' * (len(outside) > 1)}" if outside else ""
     if found["greatest"] is None:
         return f"the model's free motion ends with a fall of the block{apart}"
     repeats = f"repeats every {found['repeats']} cycles" if found["repeats"] else "does not repeat"
     text = f"the model's free motion {repeats}, with peaks up to alpha_2 = {found['greatest']:.3f}"
     low, high = found["low"][-1], found["high"][-1]
     if low is not None:
-        text += f" ({low:.3f} to {high:.3f} for a specimen within the uncertainty, with 95 %)"
+        text += f" ({low:.3f} to {high:.3f} among {MEMBERS} specimens within the uncertainty)"
     return text + apart

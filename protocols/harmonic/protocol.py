@@ -69,8 +69,8 @@ def _end_of_range(side: str, name: str) -> Any:
     return quantity(
         None,
         "1",
-        f"{side} end of the interval that contains the predicted alpha_2_{name} of a specimen within the uncertainty "
-        "with 95 %",
+        f"{side} end of the range of alpha_2_{name}_predicted among drawn specimens, which contains that of a specimen "
+        "within the uncertainty with 95 %",
     )
 
 
@@ -143,7 +143,7 @@ class HarmonicPoint(Parameters):
     free_agrees: bool | None = quantity(
         None,
         "1",
-        "whether least, mean and greatest peak are all within the predicted intervals, each widened by its uncertainty",
+        "whether least, mean and greatest peak are all within the predicted ranges, each widened by its uncertainty",
     )
     alpha_2_orbit: float | None = quantity(
         None, "1", "gain of the orbit about which an unsteady motion revolves, from the mean cycle of the motion"

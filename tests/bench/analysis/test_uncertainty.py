@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import t
 
-from bench.analysis.uncertainty import enlarged, mean_of_repeats, next_value
+from bench.analysis.uncertainty import enlarged, mean_of_repeats
 
 TRIALS = 1500
 
@@ -38,19 +38,6 @@ def test_equal_uncertainties_have_the_student_interval_of_the_plain_mean() -> No
     assert found.values[0] == pytest.approx(4.0)
     assert 1.959964 * found.scatter[0] == pytest.approx(t.ppf(0.975, 2) * 3.0 / np.sqrt(3.0), rel=1e-6)
     assert found.birge[0] == pytest.approx(3.0e6)
-
-
-@pytest.mark.parametrize("earlier", [2, 4, 8, 16])
-def test_the_interval_of_the_next_value_contains_95_percent(earlier: int) -> None:
-    random = np.random.default_rng((9, earlier))
-    low, high = next_value(random.normal(3.0, 2.0, (earlier, 20_000)))
-    following = random.normal(3.0, 2.0, 20_000)
-    assert np.mean((low < following) & (following < high)) == pytest.approx(0.95, abs=0.006)
-
-
-def test_the_interval_of_the_next_value_needs_two_earlier_ones() -> None:
-    assert np.isnan(next_value(np.zeros((1, 3)))).all()
-    assert np.isnan(next_value(np.zeros((0, 3)))).all()
 
 
 def test_what_agrees_is_weighted_by_its_uncertainty_and_has_no_scatter() -> None:
