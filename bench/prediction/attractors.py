@@ -94,7 +94,7 @@ def long_term(
     shorter = min(cycles, MEMBER_CYCLES)
     (bare, motion), *others = in_threads(motions, [(fixed.specimen, cycles), *((each, shorter) for each in drawn)])
     kept = np.array([np.array(other.within) / each for each, other in others if other.fallen is None])
-    low, high = (kept.min(axis=0), kept.max(axis=0)) if len(kept) > 1 else (np.full(3, nan), np.full(3, nan))
+    low, high = (kept.min(axis=0), kept.max(axis=0)) if len(kept) > 1 else np.full((2, 3), nan)
     falls = 1.0 - len(kept) / len(others) if others else nan
     least, mean, most = (each / bare for each in motion.within)
     return LongTerm(

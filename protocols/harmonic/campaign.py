@@ -25,7 +25,7 @@ from bench.protocol import Plan, Prepared, Result, Sources
 from bench.result_cache import cached
 from protocols.harmonic.forecast import forecast
 from protocols.harmonic.plan import HarmonicPlan
-from protocols.harmonic.protocol import HarmonicParameters
+from protocols.harmonic.protocol import COMPARED, HarmonicParameters
 from sim.errors import InvalidInput
 from sim.gain import gain_spectrum, predict_gain
 from sim.knowledge import SpecimenKnowledge
@@ -255,8 +255,7 @@ def _cells(row: dict[str, Any]) -> list[str]:
         return ABSENT if value is None else yes if value else no
 
     measured, predicted = row.get("alpha_2"), row.get("alpha_2_predicted")
-    # an unsteady motion does not follow the predicted orbit, so no difference is shown
-    compared = row.get("status") in ("steady", "resting", "held")
+    compared = row.get("status") in COMPARED
     return [
         number("beta", ".3f"),
         number("omega_rad_s", ".3f"),

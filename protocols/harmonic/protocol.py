@@ -65,6 +65,11 @@ class PointStatus(StrEnum):
     OVERTURNED = "overturned"
 
 
+COMPARED = (PointStatus.STEADY, PointStatus.RESTING, PointStatus.HELD)
+"""Statuses of points whose gain is compared with a predicted branch; an unsteady motion is not on the predicted orbit.
+"""
+
+
 def _end_of_range(side: str, name: str) -> Any:
     return quantity(
         None,

@@ -15,6 +15,7 @@ from bench.figures.spectra_figure import gain_spectra
 from bench.prediction.bands import expanded_uncertainty
 from protocols.common.budgets import budget_parts, budgeted
 from protocols.common.sine.holding import HoldCycle
+from protocols.harmonic.protocol import COMPARED
 from protocols.harmonic.report_cycles import Dwells, MeasuredMotion, measured_figure
 from protocols.harmonic.report_hold import hold_figure
 from sim.errors import InvalidInput
@@ -172,8 +173,7 @@ def _gains(campaign: Campaign, points: Sequence[Mapping[str, Any]]) -> Table:
     rows: list[list[str]] = []
     for row in points:
         measured, predicted = row["alpha_2"], row["alpha_2_predicted"]
-        # an unsteady motion is not on the predicted orbit
-        compared = row["status"] in ("steady", "resting", "held") and measured is not None and predicted
+        compared = row["status"] in COMPARED and measured is not None and predicted
         branch = _branch(campaign, row)
         open_ = row.get("alpha_2_predicted_uncertainty")
         if open_ is None and branch is not None:

@@ -171,9 +171,7 @@ class StabilityPlan:
         # the model of the table contains the recoil, which otherwise counts as an uncertainty
         known = configuration.known_on_table if shaker is None else configuration.known
         found = predicted(orbit, known, shaker, p.harmonics)
-        under = law_prediction(
-            orbit, found.multiplier, configuration.known_on_table, shaker, p.harmonics, p.impulse_offset
-        )
+        under = law_prediction(orbit, found.multiplier, known, shaker, p.harmonics, p.impulse_offset)
         by_law = {name: _or_none(value) for name, value in predicted_columns(under).items()}
         fields |= {**_predicted_fields(found), **by_law, "reason": close_pair(orbit)}
         sine = Sine(place.omega, amplitude, calibration)

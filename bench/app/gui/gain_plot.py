@@ -106,7 +106,7 @@ class GainPlot(pg.PlotWidget):
         self._draw_spreads()
         for item in (self._spreads, self._points, self._now):
             self.addItem(item)
-        self._now.setData([], [])
+        self.hide_running()
 
     def add(self, point: Mapping[str, Any], run: int = 0) -> None:
         """Draw a finished point with its uncertainty; a point without a gain is a cross at the upper edge."""
@@ -114,7 +114,7 @@ class GainPlot(pg.PlotWidget):
 
     def _draw(self, points: Sequence[tuple[Mapping[str, Any], int]]) -> None:
         """Draw several points at once."""
-        self._now.setData([], [])
+        self.hide_running()
         self._points.addPoints([spot for point, run in points for spot in self._spot(point, run)])
         self._draw_spreads()
 
