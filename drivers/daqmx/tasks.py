@@ -85,7 +85,8 @@ class Tasks:
         """Set the output to 0 V, prepare it to start on the inputs' trigger, close the enable relay and wait for the
         amplifier.
 
-        Raises RigError if a step fails, the amplifier does not report ready, or `is_cut` becomes true.
+        Raises RigError if a step fails, a safety input is open, the amplifier does not report ready, or `is_cut`
+        becomes true.
         """
         if self.relay is not None:
             self.relay.open()
@@ -104,6 +105,8 @@ class Tasks:
             self.safety.start()
         if self.heartbeat is not None:
             self.heartbeat.beat()
+        if self.safety is not None:
+            self._require_good(self.safety)
         _require_not_cut(is_cut)
         if self.relay is not None:
             self.relay.energise()
@@ -187,6 +190,16 @@ class Tasks:
             elif self.watchdog is not None and self._relay_failed:
                 self.watchdog.await_expiry()
                 self._relay_failed = False
+
+    def _require_good(self, safety: SafetyInputs) -> None:
+        """Refuse to close the relay while an input is open: the caller's check may be seconds ago, because the lasers
+        have been observed since.
+        """
+        waits = {"amplifier ready"} if self.ready_delay is not None else set[str]()
+        opened = [name for name, is_good in safety.read().items() if not (is_good or name in waits)]
+        if opened:
+            text = f"{', '.join(opened)} open; close every safety input, then start again"
+            raise SafetyInputOpen(f"the run cannot be prepared: {text}", opened)
 
     def _await_amplifier(self, safety: SafetyInputs, delay: float, is_cut: Callable[[], bool]) -> None:
         clock = WallClock()

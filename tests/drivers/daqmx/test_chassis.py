@@ -126,7 +126,7 @@ class TestNibbles:
     def wired(self, enable: int, *contacts: int) -> dict[str, Any]:
         kinds = {"emergency_stop": EmergencyStop, "over_travel": OverTravel}
         lines = dict(zip(kinds, contacts, strict=False))
-        inputs = {name: kinds[name](line=self.LINES.format(line)) for name, line in lines.items()}
+        inputs = {name: kinds[name](line=self.LINES.format(line), good="low") for name, line in lines.items()}
         return {"enable_line": self.LINES.format(enable), "watchdog": None, **inputs}
 
     @pytest.mark.parametrize(("enable", "contact", "free"), [(0, 1, "4 to 7"), (4, 7, "0 to 3"), (3, 0, "4 to 7")])
@@ -143,4 +143,4 @@ class TestNibbles:
     def test_each_direction_in_its_own_half_works(self, server: DaqServer) -> None:
         with opened(server, **self.wired(0, 4, 5)) as session:
             session.prepare()
-            assert session.safety_inputs() == {"emergency stop": False, "over-travel": False}
+            assert session.safety_inputs() == {"emergency stop": True, "over-travel": True}

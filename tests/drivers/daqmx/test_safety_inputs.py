@@ -49,6 +49,16 @@ def test_each_input_is_told_by_its_name_at_rest_and_in_a_run(
             contacts.levels[line] = good == "high"
 
 
+def test_the_relay_stays_open_while_an_input_is_open(
+    open_session: OpenSession, contacts: Contacts, plant: Loopback
+) -> None:
+    session = open_session(**INPUTS)
+    contacts.levels[LINES["over_travel"]] = False
+    with pytest.raises(RigError, match="cannot be prepared: over-travel open"):
+        session.prepare()
+    assert not plant.ever_enabled
+
+
 def test_a_read_is_one_call_to_the_server(open_session: OpenSession, server: DaqServer) -> None:
     session = driving(open_session(**INPUTS))
     faults: Any = server._faults
@@ -71,7 +81,10 @@ def test_a_read_that_fails_ends_the_run_and_says_nothing_of_any_contact(
 
 
 @pytest.mark.parametrize("good", ["high", "low"])
-def test_a_line_that_the_device_does_not_report_is_open(open_session: OpenSession, good: str) -> None:
+def test_a_line_that_the_device_does_not_report_is_open(
+    open_session: OpenSession, contacts: Contacts, good: str
+) -> None:
+    contacts.levels = dict.fromkeys(contacts.levels, good == "high")
     session = driving(open_session(**{name: {"good": good} for name in LINES}))
     hidden: Any = session
     hidden._tasks.safety._reader.read_one_sample_one_line = lambda data, timeout: None  # noqa: ARG005

@@ -9,7 +9,7 @@ import pytest
 
 from drivers.daqmx.parameters import AUTOMATIC
 from drivers.emulation.laboratory import Laboratory
-from drivers.errors import RigError
+from drivers.errors import RigError, SafetyInputOpen
 from drivers.hardware.parameters import Hardware
 from drivers.hardware.rig import HardwareRig
 from sim.specimen import Specimen
@@ -62,6 +62,18 @@ def test_the_lasers_are_aligned_at_arming(laboratory: Laboratory) -> None:
         for name in ("laser_1", "laser_2"):
             column = names.index(name)
             assert not np.isnan(rig.channels[column].to_unit(block.counts[:, column])).all()
+
+
+def test_a_safety_input_that_opens_during_the_pulses_ends_the_run() -> None:
+    with (
+        Laboratory(VirtualBenchParameters(), Specimen(), seed=1) as laboratory,
+        HardwareRig(marked_by(laboratory, AUTOMATIC), lead=LEAD - BLOCK) as rig,
+    ):
+        started(rig)
+        laboratory.safety.break_wire("emergency_stop")
+        with pytest.raises(SafetyInputOpen, match="emergency stop opened before the first sample"):
+            rig.read(BLOCK)
+        assert not laboratory.bench.enabled
 
 
 def test_pulses_between_the_runs_give_the_rates(laboratory: Laboratory) -> None:

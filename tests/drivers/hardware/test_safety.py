@@ -14,7 +14,7 @@ from bench.testing.conformance import play, started
 from drivers.border import CheckedRig
 from drivers.emulation.control import ask
 from drivers.emulation.laboratory import Device, Laboratory
-from drivers.errors import RigError
+from drivers.errors import RigError, SafetyInputOpen
 from drivers.hardware.rig import HardwareRig
 from sim.errors import InvalidInput
 from sim.specimen import Specimen
@@ -118,6 +118,20 @@ def test_a_halt_while_the_lasers_are_observed_prevents_the_run() -> None:
         with pytest.raises(RigError, match="enable line was cut"):
             rig.arm()
         halt.join()
+        assert not laboratory.bench.enabled
+
+
+def test_an_input_that_opens_while_the_lasers_are_observed_prevents_the_run() -> None:
+    with (
+        Laboratory(VirtualBenchParameters(), Specimen(), seed=1, connection="serial") as laboratory,
+        HardwareRig(laboratory.hardware, lead=LEAD) as rig,
+    ):
+        guard = Guard(rig, Limits(), Ramps())
+        opening = threading.Timer(0.2, laboratory.safety.break_wire, ("over_travel",))
+        opening.start()
+        with pytest.raises(SafetyInputOpen, match="cannot be prepared: over-travel open"):
+            guard.arm()
+        opening.join()
         assert not laboratory.bench.enabled
 
 
