@@ -7,6 +7,7 @@ cut now). Once a ramp has begun, the factor on the commands can only fall until 
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from math import exp
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,6 +83,9 @@ class Guard:
         of samples read since the ramp ended and `_waiting` contained only zeros.
         """
         self._make_watches()
+        self._warmed = 0.0, 0.0
+        """Exponential mean of the squared coil current [A2] at the end of the last armed period, and its time [s]."""
+        self._last_read = 0.0
         self._ramp_samples: int | None = None
         self._ramp_done = 0
         self._ramp_from = 1.0
@@ -105,6 +109,9 @@ class Guard:
         if opened := self._opened():
             closing = "close every safety input, then start again"
             raise SafetyInputOpen(f"arming is refused: {', '.join(opened)} open; {closing}", opened)
+        if self._expected:
+            # the coil is still warm; an attempt to arm that failed has read nothing
+            self._warmed = self._motion.heat, self._last_read
         self._ramp_samples, self._ramp_done, self._ramp_from = None, 0, 1.0
         self._command, self._sent, self._held, self._expected = 0.0, 0.0, None, 0
         self._sending, self._owed, self._zeros = False, 0, 0
@@ -149,11 +156,14 @@ class Guard:
         played, self._waiting = queue[: volts.size], queue[volts.size :]
         over = self.ramping and self._gain(0) == 0.0 and not self._waiting.any()
         self._zeros = self._zeros + volts.size if over else 0
+        self._last_read = self._rig.clock.now()
+        if self._expected == len(block):
+            self._motion.warm(self._remaining_heat(len(block)))
         values, extremes = self._conversion.of(block.counts)
         signals = self._signals_of(values)
         exceeded, near = self._motion.check(block.first, values, signals, extremes)
         exceeded += self._sensors.check(block.first, block.counts, values, played, extremes)
-        exceeded += self._time.check(self._rig.clock.now(), self._expected)
+        exceeded += self._time.check(self._last_read, self._expected)
         exceeded.sort(key=lambda violation: (not violation.cuts, violation.sample))
         seen = exceeded[0] if exceeded else None
         if seen is not None:
@@ -250,6 +260,16 @@ class Guard:
         self._motion = MotionWatch(self._channels, rate, self._limits, self._shaker, self._further)
         self._sensors = SensorWatch(self._channels, rate, self._limits)
         self._time = TimeWatch(rate, self._limits)
+
+    def _remaining_heat(self, samples: int) -> float:
+        """Exponential mean of the squared current [A2] at the beginning of the first block, with `samples` samples.
+
+        The pause before it counts in whole seconds, so that a replay, whose blocks arrive some milliseconds earlier or
+        later, begins with the same value.
+        """
+        heat, since = self._warmed
+        pause = max(self._last_read - since - samples / self._rig.sample_rate, 0.0)
+        return heat * exp(-float(np.floor(pause)) / self._limits.heating_time)
 
     def _begin(self, duration: float) -> None:
         self._ramp_from = 1.0 if self._ramp_samples is None else float(self._gain(0))

@@ -94,6 +94,15 @@ class MotionWatch:
         self.drift_watched = False
         """Whether the drift is tared and the lasers are aimed at their storeys."""
 
+    @property
+    def heat(self) -> float:
+        """Exponential mean of the squared current [A2] up to the last block; 0 for an unknown shaker."""
+        return self._quantities.heat
+
+    def warm(self, heat: float) -> None:
+        """Set the exponential mean of the squared current before the first block to `heat` [A2]."""
+        self._quantities.warm(heat)
+
     def magnitudes(self) -> dict[str, float]:
         """Largest magnitudes in the last block, by key in `WATCHED`; for each laser and further channel, by name.
 

@@ -51,6 +51,16 @@ class WatchedQuantities:
         self._skipped_samples, self._skipped_current = 0, 0.0
         self._places = [(k, *_middle(channels[k])) for name, k in self._columns.items() if name in STOREYS]
 
+    @property
+    def heat(self) -> float:
+        """Exponential mean of the squared current [A2] up to the last block."""
+        self._catch_up()
+        return self._mean_square()
+
+    def warm(self, heat: float) -> None:
+        """Set the exponential mean of the squared current before the first block to `heat` [A2]."""
+        self._heat = np.array([heat * self._forget])
+
     def of(self, values: Array) -> dict[str, Array]:
         """Magnitude of each measured or estimated quantity, shape (n,), by key in `WATCHED`."""
         self._catch_up()
@@ -108,7 +118,7 @@ class WatchedQuantities:
         found = {key: value for key, value in magnitudes.items() if key != "laser_range"}
         if "current" in found and (current := self._load(values)[1]) is not None:
             found["current"] = largest(np.nan_to_num(current))
-            found["heating"] = sqrt(max(float(self._heat[0]), 0.0) / self._forget) if self._forget > 0.0 else 0.0
+            found["heating"] = sqrt(self._mean_square())
         for k, middle, half in self._places:
             # NaN for a laser without a valid sample
             found[self._names[k]] = float(np.fmax.reduce(np.abs(values[:, k] - middle))) / half
@@ -128,8 +138,10 @@ class WatchedQuantities:
         """Upper bound of the heating up to the end of a block whose largest current is `current` [A]: the running mean
         of the squares is at most the greater of its initial value and the largest square since.
         """
-        before = float(self._heat[0]) / self._forget if self._forget > 0.0 else 0.0
-        return sqrt(max(before, self._skipped_current**2, current**2) * (1.0 + ROUNDING))
+        return sqrt(max(self._mean_square(), self._skipped_current**2, current**2) * (1.0 + ROUNDING))
+
+    def _mean_square(self) -> float:
+        return max(float(self._heat[0]), 0.0) / self._forget if self._forget > 0.0 else 0.0
 
     def _catch_up(self) -> None:
         """Update the heating for the skipped blocks."""

@@ -57,3 +57,15 @@ def exponential_mean(values: Array, forget: float, state: Array | None = None) -
     after = np.zeros(1) if state is None else state.copy()
     kernel(mean, forget, after)
     return mean, after
+
+
+def largest_repeated_mean(values: Array, forget: float) -> float:
+    """Largest exponential mean of `values`, shape (n,), n > 0, of a programme that is repeated without pause for ever.
+
+    Upper bound for a programme that follows others of the same load, or a pause.
+    """
+    mean, _ = exponential_mean(values, forget)
+    left = forget ** np.arange(1.0, values.size + 1.0)
+    # a time constant so long that no decay is visible leaves the mean
+    begin = float(mean[-1]) / (1.0 - float(left[-1])) if left[-1] < 1.0 else float(np.mean(values))
+    return float(np.max(mean + begin * left))

@@ -137,8 +137,8 @@ def load(
 ) -> dict[str, float]:
     """Largest value from `begin` [s] on of each quantity of table and shaker, by key; unknown quantities are absent.
 
-    The heating, with time constant `heating_time` [s], is zero at the start of the programme, as in the guard after
-    arming. It is also evaluated at the end of the last sine, which is held for `held` [s].
+    The last sine is held for `held` [s]. The heating, with time constant `heating_time` [s], is that of a programme
+    that is repeated without pause, because the coil may be warm from previous programmes.
     """
     times = np.arange(0.0, program.duration, STEP)
     amplitude, omega, _ = envelope(program, times)
@@ -157,12 +157,15 @@ def load(
 
 def _heating(current: Array, held: float, time: float) -> float:
     """Largest rms current [A], the root of the exponentially weighted mean of current^2 / 2, with the last amplitude
-    held for `held` [s].
+    held for `held` [s], after which the programme begins again.
     """
     power = 0.5 * current**2
     mean, _ = exponential_mean(power, float(np.exp(-STEP / time)))
-    end = power[-1] + (mean[-1] - power[-1]) * np.exp(-held / time)
-    return float(np.sqrt(max(float(mean.max()), float(end))))
+    left = np.exp(-STEP / time * np.arange(1, power.size + 1))
+    kept = float(np.exp(-held / time))
+    end = float(power[-1]) + (float(mean[-1]) - float(power[-1])) * kept
+    begin = end / -float(np.expm1(-(STEP * power.size + held) / time))
+    return float(np.sqrt(max(float(np.max(mean + begin * left)), begin)))
 
 
 PER_CYCLE = 32

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.config.model import BenchConfiguration
-from bench.guard.shaker import Motion, ShakerModel, exponential_mean
+from bench.guard.shaker import Motion, ShakerModel, largest_repeated_mean
 from sim.channel import STOREYS
 from sim.linear import frame_matrices
 from sim.specimen import Specimen
@@ -73,12 +73,9 @@ def resting_demands(
     made = {name: np.fft.irfft(spectrum, size)[: acceleration.size] for name, spectrum in series.items()}
     found = peaks(made)
     if "current" in made:
-        # the larger of the guard's exponential mean and the mean over the record: the latter exceeds the former if the
-        # record is short compared with the time constant, and other records may precede this one
-        squares = made["current"] ** 2
+        # other records may precede this one
         forget = float(np.exp(-1.0 / (configuration.limits.heating_time * sample_rate)))
-        greatest = max(float(exponential_mean(squares, forget)[0].max()), float(np.mean(squares)))
-        found["heating"] = float(np.sqrt(greatest))
+        found["heating"] = float(np.sqrt(largest_repeated_mean(made["current"] ** 2, forget)))
     return found
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from bench.config.model import BenchConfiguration
 from bench.control.starts import CATCH_ANGLE
 from bench.control.target import integrated
-from bench.guard.shaker import exponential_mean
+from bench.guard.shaker import largest_repeated_mean
 from bench.preflight.demands import (
     UNKNOWN_SHAKER,
     StageDemands,
@@ -78,8 +78,7 @@ def load(
     found = peaks(series)
     if "current" in series:
         forget = float(np.exp(-1.0 / (configuration.limits.heating_time * target.sample_rate)))
-        mean, _ = exponential_mean(series["current"] ** 2, forget)
-        found["heating"] = float(np.sqrt(mean.max()))
+        found["heating"] = float(np.sqrt(largest_repeated_mean(series["current"] ** 2, forget)))
     if response is not None:
         volts = _drive(shaking, payload, response)
         slew = float(np.abs(np.diff(volts)).max()) * target.sample_rate

@@ -283,6 +283,39 @@ def test_heating_follows_the_square_of_the_current() -> None:
     assert reached == pytest.approx(tau * np.log(1.0 / 0.36), abs=0.002)
 
 
+def _warmed(rig: LoopbackRig, guard: Guard) -> float:
+    """Drive some seconds at 5 A, and come to rest; mean square of the current up to now, by a loop over samples."""
+    guard.arm()
+    levels = np.linspace(0.0, 5.0, 20 * N)
+    for block in (*np.split(levels, 20), *[np.full(N, 5.0)] * 30):
+        guard.exchange(block)
+    guard.stop()
+    _run_out(guard, np.full(N, 5.0))
+    guard.disarm()
+    mean, forget = 0.0, np.exp(-1.0 / (2.0 * rig.sample_rate))
+    for volts in rig.played:
+        mean = forget * mean + (1.0 - forget) * volts**2
+    return mean
+
+
+@pytest.mark.parametrize("pause", [0.0, 3.4])
+def test_the_coil_is_still_warm_when_the_rig_is_armed_again(pause: float) -> None:
+    rig = _bench_rig(table_acceleration=lambda v: v, table_displacement=_nothing)
+    limits = Limits(acceleration=10.0, heating=9.0, heating_time=2.0)
+    guard = Guard(rig, limits, RAMPS, ShakerModel(20.0, 0.0, 20.0), SignalMap(rig.channels, "table"))
+    heat = _warmed(rig, guard)
+    assert heat > 0.2
+    rig.clock.wait_until(rig.clock.now() + pause)
+    # armed, but stopped before the first block: nothing is forgotten
+    guard.arm()
+    guard.disarm()
+    guard.arm()
+    found = guard.exchange(np.zeros(N)).magnitudes()["heating"]
+    # whole seconds of the pause count; the block itself cools the coil further, by at most N samples
+    cooled = heat * np.exp(-np.floor(pause) / 2.0)
+    assert cooled * np.exp(-N / rig.sample_rate / 2.0) * (1.0 - 1e-9) <= found**2 <= cooled * (1.0 + 1e-9)
+
+
 @pytest.mark.parametrize(
     ("channel", "reading", "quantity"),
     [("laser_1", 33.0, "share of the laser's range"), ("laser_2", 0.09, "drift")],

@@ -15,7 +15,7 @@ from bench.config.model import BenchConfiguration
 from bench.control.oscillator import Segment, program
 from bench.datafile import tables
 from bench.guard.limits import Limits
-from bench.guard.shaker import ShakerModel
+from bench.guard.shaker import ShakerModel, largest_repeated_mean
 from bench.preflight.demands import IdentifiedTable, SimulatedTable, load, response_of
 from bench.preflight.margins import Demand, Forecast, Stage, bounds, margins, refusal, warnings
 from bench.protocol import Plan, Prepared, Result
@@ -252,3 +252,33 @@ def test_the_heating_of_a_long_record_is_that_of_its_strong_part() -> None:
     rms = float(np.sqrt(np.mean(shaker.current(acceleration, displacement) ** 2)))
     assert found["heating"] == pytest.approx(np.sqrt(greatest), rel=5e-3)
     assert found["heating"] > 1.5 * rms
+
+
+def test_the_heating_is_that_of_programmes_without_pause() -> None:
+    """Forty repetitions, by a loop over samples."""
+    rate, time = 50.0, 60.0
+    squares = np.concatenate((np.full(500, 4.0), np.linspace(9.0, 0.0, 1000)))
+    forget = float(np.exp(-1.0 / (time * rate)))
+    mean = greatest = 0.0
+    for square in np.tile(squares, 40):
+        mean = forget * mean + (1.0 - forget) * square
+        greatest = max(greatest, mean)
+    assert largest_repeated_mean(squares, forget) == pytest.approx(greatest, rel=1e-6)
+    assert largest_repeated_mean(squares, 1.0) == pytest.approx(np.mean(squares))
+
+
+def test_the_heating_of_a_short_sine_is_that_of_its_repetitions() -> None:
+    """A sine for 24 s: the mean over rise and sine, hardly above it for a coil that is slow in comparison."""
+    found = load(
+        program([Segment(4.0, 2.0, 10.0), Segment(10.0, 2.0, 10.0)]),
+        0.0,
+        10.0,
+        payload=0.0,
+        shaker=ShakerModel(60.0, 0.0, 50.0),
+        response=None,
+        heating_time=6e3,
+    )
+    # the rise is half a cosine or a line; between a third and a half of its duration counts
+    power = 0.5 * (2.0 * 60.0 / 50.0) ** 2
+    low, high = (power * (20.0 + 4.0 * share) / 24.0 for share in (0.3, 0.5))
+    assert low < found["heating"] ** 2 < 1.005 * high
