@@ -45,6 +45,11 @@ class LaserCurve(Parameters):
             raise InvalidInput("lowest", self.lowest, f"it must be below highest = {self.highest:g} m")
         return self
 
+    def covers(self, displacements: Array) -> bool:
+        """Whether all `displacements` from rest [m] are covered; NaN counts as covered."""
+        least, greatest = np.nanmin(displacements, initial=0.0), np.nanmax(displacements, initial=0.0)
+        return bool(self.lowest - self.rest <= least and greatest <= self.highest - self.rest)
+
     def corrected(self, readings: Array) -> Array:
         """Readings [m] corrected for the laser's error, same shape; NaN remains NaN."""
         place = (2.0 * readings - self.highest - self.lowest) / (self.highest - self.lowest)

@@ -10,6 +10,7 @@ them.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from math import hypot, sqrt
 from typing import Any
 
 import numpy as np
@@ -121,6 +122,20 @@ class SensorUncertainty:
     def table_scale(self) -> float:
         """Relative standard uncertainty of the scales of the table's sensors."""
         return self.accuracy.table_scale if self.calibration is None else self.calibration.table_uncertainty
+
+    def linearity_amplitude(self, laser: int, displacements: Array) -> float:
+        """Amplitude [m] of the linearity error of laser 0 or 1 at `displacements` from rest [m], NaN where missing.
+
+        If a calibration covers all of them, it is that of a sine wave with the standard uncertainty of the calibration,
+        and of the error of its reference sensor; otherwise that of the data sheet.
+        """
+        limit = self.accuracy.laser_linearity * self.ranges[laser]
+        if self.calibration is None:
+            return limit
+        found = self.calibration.lasers[laser]
+        if not found.covers(displacements):
+            return limit
+        return min(limit, hypot(sqrt(2.0) * found.uncertainty, self.calibration.common_linearity))
 
     def checked_by(self, checks: Checks | None) -> "SensorUncertainty":
         """A copy with `checks` from one test of the bare frame; the same object if it already has checks or `checks` is

@@ -41,7 +41,7 @@ def draw_members(specimen: Specimen, configuration: BenchConfiguration) -> Membe
     """
     twin, random = configuration.twin, np.random.default_rng(configuration.twin.seed)
     others = configuration.known.draws(specimen, twin.members, random)
-    scales = 1.0 + configuration.analysis.table_scale * random.standard_normal(twin.members)
+    scales = 1.0 + configuration.sensors.table_scale * random.standard_normal(twin.members)
     return Members([specimen, *others], np.concatenate(([1.0], scales)))
 
 

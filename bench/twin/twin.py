@@ -113,7 +113,7 @@ class Twin:
 
         self._configuration = configuration
         self._publish, self._requests, self._patient = publish, requests, patient
-        first, second = (configuration.analysis.laser_linearity * reach for reach in configuration.laser_ranges)
+        first, second = (configuration.sensors.linearity_amplitude(laser, np.zeros(1)) for laser in range(2))
         on_ground = configuration.laser_reference == "ground"
         lag = laser_lag(configuration)
         self._setting = Setting(sample_rate, on_ground, lag, (first, second))

@@ -9,7 +9,7 @@ filters); each quantity is affected only by the noise at the frequencies that de
 density of this noise is measured at rest before the motion;
 - clock: the lasers' clocks are not synchronised, so that a laser's delay wanders by up to one of its measuring periods;
 - linearity: sine waves over the lasers' range, of any phase and typical numbers of periods, mostly absorbed by the
-fitted curvature;
+fitted curvature; smaller for calibrated lasers;
 - masses: the uncertainty of the weighing;
 - timebase: a relative error of the sample clock causes the same relative error of frequencies and dashpots, twice this
 error of stiffnesses, and none of damping ratios.
@@ -24,9 +24,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.analysis.free_decay.fit import Fit
+from bench.analysis.free_decay.fit import OFFSETS, Fit
 from bench.analysis.free_decay.response import quantities, slopes
-from bench.analysis.gain import SensorAccuracy
+from bench.analysis.sensor_accuracy import SensorUncertainty
 
 Array = NDArray[np.float64]
 
@@ -40,18 +40,18 @@ PHASES = 8
 """Number of initial phases evaluated for a wandering delay."""
 
 
-def waves(fit: Fit, size: float, ranges: tuple[float, float]) -> Array:
+def waves(fit: Fit, sensors: SensorUncertainty) -> Array:
     """Linearity errors [m] of each laser for all numbers of periods and both quadrature components, shape (m, 2, n)."""
     seen = fit.fitted
     errors: list[Array] = []
-    # the phase is uniformly distributed, so each quadrature component has half the power
-    weight = size / np.sqrt(2.0 * WAVES.size)
     for laser in range(2):
+        size = sensors.linearity_amplitude(laser, seen[laser] - fit.values[OFFSETS][laser])
         for number in WAVES:
-            turn = 2.0 * np.pi * number / ranges[laser] * seen[laser]
+            turn = 2.0 * np.pi * number / sensors.ranges[laser] * seen[laser]
             for shape in (np.sin(turn), np.cos(turn)):
                 error = np.zeros_like(seen)
-                error[laser] = weight * ranges[laser] * shape
+                # the phase is uniformly distributed, so each quadrature component has half the power
+                error[laser] = size / np.sqrt(2.0 * WAVES.size) * shape
                 errors.append(error)
     return np.array(errors)
 
@@ -87,13 +87,11 @@ BAND = 30.0
 
 @dataclass(frozen=True, eq=False)
 class Errors:
-    """Description of the errors: the `accuracy` of the sensors, the lasers' `ranges` [m], the time [s] until which the
-    section is at rest (`quiet`, 0 if it does not begin at rest), and the covariance of the `masses` [kg2], shape (2,
-    2).
+    """Description of the errors: uncertainty of the `sensors`, the time [s] until which the section is at rest
+    (`quiet`, 0 if it does not begin at rest), and the covariance of the `masses` [kg2], shape (2, 2).
     """
 
-    accuracy: SensorAccuracy
-    ranges: tuple[float, float]
+    sensors: SensorUncertainty
     quiet: float
     masses: Array
 
@@ -127,7 +125,7 @@ def fit_uncertainty(fit: Fit, errors: Errors) -> Uncertainty:
     turn = np.hstack((turn, np.zeros((len(turn), fit.values.size - turn.shape[1]))))
     shift = turn @ -fit.moved(fit.mass_jacobian).T + direct
     parts = {name: turn @ part @ turn.T for name, part in _parts(fit, errors).items()}
-    late = errors.accuracy.timebase * _RATES * quantities(fit.constants)
+    late = errors.sensors.accuracy.timebase * _RATES * quantities(fit.constants)
     shared = {"masses": shift @ errors.masses @ shift.T, "timebase": np.outer(late, late)}
     return Uncertainty(parts | shared, shift, late)
 
@@ -145,8 +143,8 @@ def _parts(fit: Fit, errors: Errors) -> dict[str, Array]:
     return {
         "noise": _noise(fit),
         "table": _table(fit, errors.quiet),
-        "clock": _spread(fit.moved(clocks(fit, errors.accuracy.laser_timing))),
-        "linearity": _spread(fit.moved(waves(fit, errors.accuracy.laser_linearity, errors.ranges))),
+        "clock": _spread(fit.moved(clocks(fit, errors.sensors.accuracy.laser_timing))),
+        "linearity": _spread(fit.moved(waves(fit, errors.sensors))),
     }
 
 

@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 
 from bench.analysis.free_decay.covariance import Errors, Uncertainty, fit_uncertainty
 from bench.analysis.free_decay.damping import DampingCourse, damping_courses
-from bench.analysis.free_decay.fit import Fit, fit_from_scratch
+from bench.analysis.free_decay.fit import NOISE, OFFSETS, Fit, fit_from_scratch
 from bench.analysis.free_decay.response import OMEGA1, XI1, quantities
 from bench.analysis.free_decay.stretch import Stretch, Unusable, stretch_of
-from bench.analysis.gain import SensorAccuracy
+from bench.analysis.sensor_accuracy import SensorUncertainty
 from bench.analysis.signals import DISPLACEMENT, LASER_1, LASER_2
 from bench.analysis.uncertainty import enlarged, mean_of_repeats
 
@@ -29,18 +29,24 @@ _HELD = 0.5
 _SLIPPED = 0.1
 """Fraction of a storey's largest displacement at which the storey counts as released."""
 
+_NOT_EXPLAINED = 0.05
+"""Largest root mean square of the residual of a decay, as a fraction of that of the motion; a damping that depends on
+the amplitude leaves much less.
+"""
+
+_NOISY = 5.0 * NOISE
+"""Root mean square of the residual [m] below which it may be noise."""
+
 
 @dataclass(frozen=True, eq=False)
 class Setting:
-    """Known conditions of a recording: `sample_rate` [1/s], the lasers' `ranges` [m] and whether they are fixed to the
-    table (`on_table`), their `accuracy`, the `masses` (m1, m2) [kg] and their covariance `masses_covariance` [kg2],
-    shape (2, 2).
+    """Known conditions of a recording: `sample_rate` [1/s], uncertainty of the `sensors`, whether the lasers are fixed
+    to the table (`on_table`), the `masses` (m1, m2) [kg] and their covariance `masses_covariance` [kg2], shape (2, 2).
     """
 
     sample_rate: float
-    ranges: tuple[float, float]
+    sensors: SensorUncertainty
     on_table: bool
-    accuracy: SensorAccuracy
     masses: tuple[float, float]
     masses_covariance: Array
 
@@ -90,7 +96,8 @@ def released_decay(signals: Array, setting: Setting) -> Decay:
 
 def _decay(stretch: Stretch, setting: Setting, quiet: float, begin: float) -> Decay:
     fit = fit_from_scratch(stretch, setting.masses)
-    errors = Errors(setting.accuracy, setting.ranges, quiet, setting.masses_covariance)
+    _require_decay(fit)
+    errors = Errors(setting.sensors, quiet, setting.masses_covariance)
     found = quantities(fit.constants)
     ratios, omegas = found[XI1 : XI1 + 2], found[OMEGA1 : OMEGA1 + 2]
     return Decay(
@@ -101,6 +108,19 @@ def _decay(stretch: Stretch, setting: Setting, quiet: float, begin: float) -> De
         begin=begin,
         peak=float(np.nanmax(np.abs(stretch.readings[1] - stretch.readings[0]))),
     )
+
+
+def _require_decay(fit: Fit) -> None:
+    """Raise Unusable if the fitted decay of two modes leaves too much of the motion, as after a push."""
+    there = np.isfinite(fit.stretch.readings)
+    moved = np.where(there, fit.stretch.readings - fit.values[OFFSETS][:, None], 0.0)
+    left = float(np.sqrt(np.sum(fit.residual**2) / there.sum()))
+    share = left / max(float(np.sqrt(np.sum(moved**2) / there.sum())), left)
+    if left > _NOISY and share > _NOT_EXPLAINED:
+        raise Unusable(
+            f"the motion is not a free decay of the frame: the fit leaves {left * 1e3:.2g} mm rms, {100 * share:.0f} % "
+            "of the motion; do not touch the frame after the release, and check that nothing else moves it"
+        )
 
 
 def _released(stretch: Stretch) -> float:

@@ -249,9 +249,8 @@ def fit_setting(parameters: DecayParameters, configuration: BenchConfiguration) 
     frame = configuration.known_specimen.frame
     return Setting(
         sample_rate=configuration.sample_rate,
-        ranges=configuration.laser_ranges,
+        sensors=configuration.sensors,
         on_table=configuration.laser_reference == "table",
-        accuracy=configuration.analysis,
         masses=(frame.m1, frame.m2),
         masses_covariance=mass_covariance(parameters, configuration.identified),
     )

@@ -1,6 +1,7 @@
 """Frames from decays: against motions that scipy made, with lasers that scale, lag and bend; and how sure it is."""
 
 from dataclasses import replace
+from datetime import UTC, datetime
 from math import pi
 
 import numpy as np
@@ -14,7 +15,8 @@ from bench.analysis.free_decay.decay import Setting, combine, pulsed_decay, rele
 from bench.analysis.free_decay.fit import fit_from_scratch
 from bench.analysis.free_decay.response import K1, K2, OMEGA1, XI1, XI2, Constants, quantities, response
 from bench.analysis.free_decay.stretch import Unusable, stretch_of
-from bench.analysis.gain import SensorAccuracy
+from bench.analysis.laser_calibration import LaserCalibration, LaserCurve
+from bench.analysis.sensor_accuracy import SensorAccuracy, SensorUncertainty
 from sim.specimen import Frame
 
 Array = NDArray[np.float64]
@@ -29,8 +31,12 @@ def constants(frame: Frame = FRAME, k_c: float = 0.0) -> Constants:
     return Constants(frame.m1, frame.m2, frame.k1 + k_c, frame.k2, *frame.dashpots)
 
 
+def sensors(accuracy: SensorAccuracy) -> SensorUncertainty:
+    return SensorUncertainty(accuracy, (0.2, 0.2))
+
+
 def setting(**changes: object) -> Setting:
-    known = Setting(RATE, (0.2, 0.2), False, SensorAccuracy(), (FRAME.m1, FRAME.m2), np.zeros((2, 2)))
+    known = Setting(RATE, sensors(SensorAccuracy()), False, (FRAME.m1, FRAME.m2), np.zeros((2, 2)))
     return replace(known, **changes)  # type: ignore[arg-type]
 
 
@@ -121,7 +127,7 @@ def test_the_stated_uncertainty_is_the_scatter_of_many_recordings() -> None:
         noisy[:, 4:6] += signal.lfilter([1.0], [1.0, -0.95], white, axis=0)
         found = fit_from_scratch(stretch_of(noisy[:, 1], noisy[:, 4:6].T, RATE, on_table=False), setting().masses)
         errors.append(quantities(found.constants) - truth)
-        stated.append(np.sqrt(np.diag(fit_uncertainty(found, Errors(exact, (0.2, 0.2), QUIET, np.zeros((2, 2)))).own)))
+        stated.append(np.sqrt(np.diag(fit_uncertainty(found, Errors(sensors(exact), QUIET, np.zeros((2, 2)))).own)))
     share = np.sqrt(np.mean(np.square(errors), axis=0) / np.mean(np.square(stated), axis=0))
     # root of chi2 over 20 degrees of freedom, between its 0.1 % and 99.9 %
     assert np.all((share > 0.54) & (share < 1.51)), share
@@ -148,7 +154,7 @@ def test_weighing_errors_move_the_stiffness_as_stated() -> None:
 def test_a_slow_timebase_moves_what_has_a_rate_in_it_as_stated() -> None:
     signals, share = recording(constants()), 1e-3
     accuracy = SensorAccuracy(timebase=share)
-    decay = pulsed_decay(signals, setting(accuracy=accuracy), QUIET, BEGIN)
+    decay = pulsed_decay(signals, setting(sensors=sensors(accuracy)), QUIET, BEGIN)
     # the same samples, said to come faster than they did
     fast = setting(sample_rate=RATE * (1.0 + share))
     moved = pulsed_decay(signals, fast, QUIET / (1.0 + share), BEGIN / (1.0 + share)).quantities - decay.quantities
@@ -238,3 +244,38 @@ def test_what_tells_nothing_is_refused() -> None:
     late[-1000:, 5] += 0.01
     with pytest.raises(Unusable, match=r"released 0\.\d s before the end of the recording: release it earlier"):
         released_decay(late, setting())
+
+
+def test_a_frame_that_is_touched_after_its_release_is_no_free_decay() -> None:
+    pushed = released(constants())
+    pushed[:, 4:6] += 0.002 * np.exp(-((TIME - 7.0) ** 2))[:, None] * [0.6, 1.0]
+    with pytest.raises(Unusable, match=r"not a free decay of the frame: the fit leaves 0\.45 mm rms"):
+        released_decay(pushed, setting())
+    # a damping that depends strongly on the amplitude is accepted
+    assert released_decay(released(constants(), drag=2.0), setting()).quantities[XI1] > 1.5 * FRAME.xi1
+
+
+def test_the_linearity_of_a_calibrated_laser_is_that_of_its_calibration() -> None:
+    curve = LaserCurve(
+        sensor="ILD1420", lowest=-0.03, highest=0.05, rest=0.01, error=(0.0, 1e-4), uncertainty=1e-5, scale=1.0,
+        delay=0.0, delay_uncertainty=0.0,
+    )  # fmt: skip
+    calibration = LaserCalibration(
+        date=datetime(2026, 1, 1, tzinfo=UTC), valid_days=90.0, laser_1=curve, laser_2=curve, differential_scale=1.0,
+        differential_uncertainty=1e-4, common_linearity=3e-5, table_displacement=1.0, table_acceleration=1.0,
+        table_uncertainty=1e-3,
+    )  # fmt: skip
+    accuracy = SensorAccuracy(laser_linearity=8e-4)
+    calibrated = SensorUncertainty(accuracy, (0.2, 0.2), calibration)
+    for laser in range(2):
+        inside, outside = np.array([-0.04, np.nan, 0.04]), np.array([0.0, 0.041])
+        assert calibrated.linearity_amplitude(laser, inside) == pytest.approx(np.hypot(np.sqrt(2.0) * 1e-5, 3e-5))
+        assert calibrated.linearity_amplitude(laser, outside) == pytest.approx(1.6e-4)
+        assert sensors(accuracy).linearity_amplitude(laser, inside) == pytest.approx(1.6e-4)
+    # by the covariance, quadratically
+    signals = released(constants())
+    parts = [
+        np.diag(released_decay(signals, setting(sensors=those)).uncertainty.parts["linearity"])
+        for those in (sensors(accuracy), calibrated)
+    ]
+    assert parts[1] == pytest.approx(parts[0] * (np.hypot(np.sqrt(2.0) * 1e-5, 3e-5) / 1.6e-4) ** 2, rel=1e-9)
