@@ -215,7 +215,7 @@ def identified(
         yield Publish(StepStarted(f"multisine {number} of {parameters.realisations}, {found.grid.duration:.0f} s"))
         volts = found.grid.record(drive_for(motion, response, found.grid, rules.knee))
         rules.require_drive(volts)
-        outcome = yield from played(volts, rules)
+        outcome = yield from _complete(volts, rules, f"multisine {number}")
         if isinstance(outcome, Fallen):
             raise (yield from _fell(specimen))
         yield from _warned(outcome, specimen, configuration)
@@ -225,6 +225,27 @@ def identified(
     model, agreement = _identified(records, found, specimen)
     yield from _publish_model(model, agreement)
     return model
+
+
+def _complete(volts: Array, rules: Rules, name: str) -> Generator[Step, Outcome, Played | Fallen]:
+    """Play a multisine without missing samples of the table's motion; it is repeated once. Raises Unmeasurable if they
+    are missing again.
+    """
+    for again in (False, True):
+        outcome = yield from played(volts, rules)
+        if isinstance(outcome, Fallen):
+            return outcome
+        moved = outcome.signals[:, [ACCELERATION, DISPLACEMENT]]
+        lost = int(np.count_nonzero(~np.isfinite(moved).all(axis=1)))
+        if not lost:
+            return outcome
+        if not again:
+            rules.remains(rules.expected - rules.gone + volts.size / rules.sample_rate + OVERHEAD)
+            yield Publish(Warned(f"{name}: samples of the table's motion are missing ({lost}); it is repeated"))
+    raise Unmeasurable(
+        f"{name}: samples of the table's motion are missing in both attempts ({lost} in the last one): check the "
+        "wiring and the range of the accelerometer and of the displacement sensor"
+    )
 
 
 def _mounting(specimen: Specimen) -> OperatorAction:

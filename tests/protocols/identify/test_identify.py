@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from bench.analysis.signals import DISPLACEMENT
 from bench.app.catalogue import load_protocol
 from bench.app.preflight import compile_run
 from bench.app.session import SessionResult, run_session
@@ -18,13 +19,16 @@ from bench.config.sections import Acquisition, Simulation
 from bench.control.table_model import TableModel
 from bench.datafile.reader import open_datafile
 from bench.engine.interface import Requests, Unattended
+from bench.engine.steps import Done, Outcome, Play, Played, Publish, Step
 from bench.events import Acquired, Event, PointFinished, StepStarted, Warned
 from bench.findings import TableIdentified
 from bench.guard.limits import Limits, Ramps
 from bench.preflight.demands import response_of
 from bench.preflight.motion import RESTING, resting_demands
 from bench.results import FILE
+from protocols.common.calibrate import Unmeasurable
 from protocols.common.identification.parameters import IdentifyParameters
+from protocols.common.identification.plan import OVERHEAD, Rules, _complete
 from protocols.common.identification.signal import BLOCK_SHARE, SHARE, grid, planned, settling
 from protocols.identify.protocol import IdentifiedBand
 from sim.errors import InvalidInput
@@ -224,3 +228,42 @@ def test_the_lines_cover_the_band_that_replication_needs(odd: bool, period: floa
 def test_what_cannot_be_identified_is_refused(changes: dict[str, float], says: str) -> None:
     with pytest.raises(ValueError, match=says):
         PROTOCOL.prepare(IdentifyParameters(**changes), bench(), None)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("losses", [0, 1, 2])
+def test_a_multisine_with_missing_samples_is_repeated_once(losses: int) -> None:
+    volts, rules = np.zeros(100), Rules(Limits(), 1000.0, 20.0, 60.0)
+    running = _complete(volts, rules, "multisine 2")
+    warned: list[str] = []
+    plays = 0
+
+    def answered(step: Step) -> Outcome:
+        nonlocal plays
+        if isinstance(step, Publish) and isinstance(step.event, Warned):
+            warned.append(step.event.text)
+        if not isinstance(step, Play):
+            return Done()
+        plays += 1
+        signals = np.zeros((100, 6))
+        if plays <= losses:
+            signals[40:47, DISPLACEMENT] = np.nan
+        return Played(signals, volts)
+
+    def finished() -> Outcome:
+        step = next(running)
+        while True:
+            try:
+                step = running.send(answered(step))
+            except StopIteration as end:
+                return end.value
+
+    if losses < 2:
+        outcome = finished()
+        assert isinstance(outcome, Played)
+        assert np.isfinite(outcome.signals).all()
+    else:
+        with pytest.raises(Unmeasurable, match=r"multisine 2: .* missing in both attempts \(7 in the last one\)"):
+            finished()
+    assert warned == ["multisine 2: samples of the table's motion are missing (7); it is repeated"] * min(losses, 1)
+    # the repetition is expected to take as long again
+    assert rules.expected == pytest.approx(60.0 + min(losses, 1) * (0.1 + OVERHEAD))
