@@ -23,6 +23,9 @@ peak differed by at most 0.2 % from that with 600 intervals of two steps, less t
 does not repeat.
 """
 
+ROUNDING = 1e-6
+"""Largest relative difference of peaks that are the same."""
+
 LONGEST_PERIOD = 24
 """Longest period of the motion that is searched for [cycles]."""
 
@@ -79,7 +82,7 @@ def attractor(specimen: Specimen, shaker: Shaker, orbit: TableOrbit, cycles: int
     y, mode = orbit.start.copy(), corner(orbit.start)
     y[6] *= 1.0 + DISTURBANCE
     commands = period.commands(drive)
-    carried, mean = np.array([commands[-1], 0.0]), np.zeros(drive.size, dtype=np.complex128)
+    carried, mean = np.array([period.output(commands), 0.0]), np.zeros(drive.size, dtype=np.complex128)
     peaks, drifts = np.empty((cycles, 2)), np.empty((KEPT, TICKS))
     for cycle in range(cycles):
         mode, samples = period.advance(mode, y, carried, commands)
@@ -116,7 +119,9 @@ def period_of(peaks: Array) -> int:
     """
     if not peaks.size:
         return 0
-    allowed = np.minimum(REPEATED * peaks.max(axis=0), ALIKE * np.ptp(peaks, axis=0))
+    largest = peaks.max(axis=0)
+    # the peaks of a constant motion differ by rounding only
+    allowed = np.maximum(np.minimum(REPEATED * largest, ALIKE * np.ptp(peaks, axis=0)), ROUNDING * largest)
     for period in range(1, min(LONGEST_PERIOD, peaks.shape[0] // 2) + 1):
         if bool(np.all(np.abs(peaks[period:] - peaks[:-period]) <= allowed)):
             return period

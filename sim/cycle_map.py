@@ -125,8 +125,8 @@ def cycle_map(fixed: Orbit, shaker: Shaker | None, harmonics: int, blend: float 
 
     def response(state: Array, before: complex, now: complex) -> Array:
         """State after the cycle, relative to its scales, and coefficients y of the cycle."""
-        change = ((before + (now - before) * done) * carrier).real
-        after, samples = period.run(orbit.start + state * sizes, orbit.drive, change)
+        changes = (before * carrier).real, ((before + (now - before) * done) * carrier).real
+        after, samples = period.run(orbit.start + state * sizes, orbit.drive, changes)
         u1, drift = samples[:, 2], samples[:, 3] - samples[:, 2]
         return np.concatenate((after / sizes, coefficients(fourier @ u1, fourier @ drift)))
 

@@ -181,7 +181,8 @@ def _peaks(chunk: Sequence[_Member]) -> Floats:
     for i, (orbit, specimen) in enumerate(chunk):
         if orbit.branch == "resting" and orbit.amplitude < resting_level(specimen, orbit.omega):
             found = steady_peaks(specimen, orbit.omega, orbit.amplitude, resting=True)
-            peaks[i] = found.u1, found.drift
+            if not specimen.beta or found.u1 < specimen.d:
+                peaks[i] = found.u1, found.drift
     return peaks
 
 

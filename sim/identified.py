@@ -204,7 +204,11 @@ class Identified(Parameters):
             raise InvalidInput(
                 "findings", ", ".join(values), f"these values do not form a valid specimen: {cause}"
             ) from None
-        return best if specimen.label is None else best.coupled(specimen.label)
+        if specimen.label is None:
+            return best
+        # the declared stiffness of a spring with another label is kept, unless it has been measured
+        declared = specimen.spring_label is not None
+        return (best.with_spring(specimen.k_c, specimen.label) if declared else best).coupled(specimen.label)
 
     def correlation(self, names: Sequence[str]) -> NDArray[np.float64]:
         """Correlation matrix of the findings `names`, shape (n, n)."""

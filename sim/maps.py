@@ -183,6 +183,8 @@ def _resting(specimens: list[Specimen], omegas: Floats, amplitude: float) -> tup
     peaks, u1 = _linear_peaks(specimens[0], springs, omegas, amplitude)
     moment = block.h_b * block.mass * amplitude - np.array(springs)[:, None] * specimens[0].frame.h1 * u1
     lifts = ~(np.abs(moment) < block.b * specimens[0].g * block.mass)
+    # the spring would have no length
+    lifts |= (np.array(springs) > 0.0)[:, None] & ~(peaks[:, :, 0] < specimens[0].d)
     rates = np.stack([resting_rates(specimen) for specimen in specimens])
     multipliers = np.exp(rates[:, None, :] * (tau / omegas)[None, :, None])
     peaks[lifts], multipliers[lifts] = np.nan, np.nan

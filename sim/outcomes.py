@@ -126,6 +126,10 @@ def reached(
     motion = simulate(specimen, program, peaks_from=program.duration - window)
     time, rounds = motion.end_time, 0
     while (outcome := _judged(motion, steady)) is Outcome.OTHER and rounds < _most_rounds(steady):
+        if specimen.beta and abs(motion.end.u1) >= specimen.d:
+            # the spring has no length, so that the motion cannot be continued
+            outcome = Outcome.FAILED
+            break
         motion = simulate(specimen, more, state=motion.end)
         time, rounds = time + motion.end_time, rounds + 1
     return Reached(outcome, time, motion.overturned, motion.peaks if motion.status is Status.COMPLETED else None)

@@ -213,8 +213,8 @@ class Specimen(Parameters):
         return self.g / self.block.slenderness
 
     def coupled(self, label: float) -> "Specimen":
-        """Return the specimen with the spring labelled `label`, with its stiffness as measured or, if not measured, its
-        nominal stiffness.
+        """Return the specimen with the spring labelled `label`. Its stiffness is the measured one or, if there is none,
+        that of the mounted spring if this has the label, or else the nominal one.
 
         Raises InvalidInput for a label that is negative or not finite.
         """
@@ -223,6 +223,8 @@ class Specimen(Parameters):
         measured = next((each.k_c for each in self.springs if isclose(each.label, label)), None)
         if measured is not None:
             return self.with_spring(measured, label)
+        if self.spring_label is not None and isclose(self.spring_label, label):
+            return self
         return self._mounted(label) if self.spring_k1 is None else self.with_spring(label * self.spring_k1, label)
 
     def with_spring(self, k_c: float, label: float | None = None) -> "Specimen":

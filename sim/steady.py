@@ -155,13 +155,16 @@ def resting_state(specimen: Specimen, omega: float, amplitude: float) -> Orbit |
     """Steady motion in which the block never lifts, in closed form; None where it does not exist.
 
     It exists if and only if |h_b M A - k_C h1 U1| < b g M, where U1 is the complex amplitude of the frame whose spring
-    is attached to the resting block (Eq. 9 and A.3 over a whole period). It is stable if the frame is damped. Raises
+    is attached to the resting block (Eq. 9 and A.3 over a whole period), and |U1| < d, because the spring's length is
+    positive. It is stable if the frame is damped. Raises
     InvalidInput as `rocking_orbit` does.
     """
     check_steady(specimen, omega, amplitude)
     if not amplitude < resting_level(specimen, omega):
         return None
     u1, u2 = steady_response(specimen, omega, amplitude, resting=True)
+    if specimen.beta and not abs(u1) < specimen.d:
+        return None
     return Orbit(
         specimen=specimen,
         omega=omega,

@@ -8,7 +8,7 @@ such that the acceleration of the table is a sine.
 
 from dataclasses import dataclass
 from functools import cached_property
-from math import tau
+from math import exp, tau
 
 import numpy as np
 from numpy.typing import NDArray
@@ -144,6 +144,7 @@ class TablePeriod:
         self._stream, self._substeps = table.stream, substeps
         self._plant = plant_of(specimen, shaker, catch_angle=np.pi / 2)
         self._omega, self._tick = omega, tau / omega / ticks
+        self._decay = exp(-self._tick / shaker.amplifier_lag) if shaker.amplifier_lag > 0.0 else 0.0
         # each command is held for a tick, so that its phase is that of the middle of the tick
         self._phase = np.asarray((np.arange(ticks) + 0.5) * (tau / ticks), dtype=np.float64)
         self._step: Array | None = None
@@ -152,6 +153,13 @@ class TablePeriod:
         """Commands in the ticks of a period, shape (ticks,), from the complex harmonics `drive`, shape (H,)."""
         orders = np.arange(1, drive.size + 1)
         return np.ascontiguousarray((np.exp(1j * np.outer(self._phase, orders)) @ drive).real)
+
+    def output(self, commands: Array) -> float:
+        """Output of the amplifier at the end of the last of many periods with these `commands`, shape (ticks,): their
+        mean with the exponential weights of the amplifier's lag.
+        """
+        weights = (1.0 - self._decay) * self._decay ** np.arange(commands.size - 1.0, -1.0, -1.0)
+        return float(weights @ commands) / (1.0 - self._decay**commands.size)
 
     def advance(self, mode: int, y: Array, carried: Array, commands: Array) -> tuple[int, Array]:
         """Advance by one period. Returns the mode after it, and the samples, shape (ticks, 9).
@@ -167,16 +175,18 @@ class TablePeriod:
         samples[-1, -1] = carried[1]
         return after, samples
 
-    def run(self, start: Array, drive: NDArray[np.complex128], change: Array | None = None) -> tuple[Array, Array]:
+    def run(
+        self, start: Array, drive: NDArray[np.complex128], changes: tuple[Array, Array] | None = None
+    ) -> tuple[Array, Array]:
         """Return the state after one period and the samples (see `advance`).
 
-        `change`, shape (ticks,), is added to the commands of the period. Raises NoOrbit if the block does not end the
-        period rocking about the corner at which it started.
+        `changes`, shape (ticks,) each, are added to the commands of the periods before, and to those of this period.
+        Raises NoOrbit if the block does not end the period rocking about the corner at which it started.
         """
         commands, y, mode = self.commands(drive), start.copy(), corner(start)
-        if change is not None:
-            commands += change
-        after, samples = self.advance(mode, y, np.array([commands[-1], 0.0]), commands)
+        before, now = (0.0, 0.0) if changes is None else changes
+        carried = np.array([self.output(commands + before), 0.0])
+        after, samples = self.advance(mode, y, carried, commands + now)
         if after != mode:
             raise NoOrbit(f"the block does not rock with the period of the drive at omega = {self._omega:g} rad/s")
         return y, samples

@@ -12,6 +12,11 @@ from bench.accelerograms.text import RecordText
 from bench.accelerograms.units import UNITS, unit_of
 from sim.errors import InvalidInput
 
+SHORTEST_STEP, LONGEST_STEP = 1e-4, 0.5
+"""Plausible range of a record's time step [s], with a margin: strong motion is sampled at 50 to 1000 Hz, old film
+records at 10 Hz or more.
+"""
+
 _SAME_STEP = 1e-6
 """Relative difference up to which two time steps, written with different numbers of digits, count as equal."""
 
@@ -84,6 +89,13 @@ def _step(name: str, given: float | None, stated: float | None) -> float:
     if stated is not None and not (isfinite(stated) and stated > 0.0):
         raise InvalidInput(
             f"dt of {name}", stated, "the step stated in the file is not a positive time: the file is damaged"
+        )
+    if stated is not None and not SHORTEST_STEP <= stated <= LONGEST_STEP:
+        raise InvalidInput(
+            f"dt of {name}",
+            stated,
+            f"the file states this step [s], but earthquake records have {SHORTEST_STEP:g} to {LONGEST_STEP:g} s: is "
+            "its time in ms, or an index? give the time in s",
         )
     if given is None and stated is None:
         raise InvalidInput(f"dt of {name}", None, "the file does not state its time step; give it as @dt=SECONDS")

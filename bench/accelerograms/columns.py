@@ -22,8 +22,11 @@ from sim.errors import InvalidInput
 Array = NDArray[np.float64]
 
 
-_STEP = re.compile(rf"\bdt\s*[=:]\s*({NUMBER})", re.IGNORECASE)
-_UNIT = re.compile(r"\b[cm]?m/s(?:ec)?(?:(?:\^|\*\*)?2\b|/s(?:ec)?\b)", re.IGNORECASE)
+_STEP = re.compile(rf"\bdt\s*[=:]\s*({NUMBER})\s*(ms|msec|milliseconds)?(?![\d./])", re.IGNORECASE)
+_UNIT = re.compile(
+    r"\b[cm]?m/s(?:ec)?(?:(?:\^|\*\*)?2\b|/s(?:ec)?\b)|\bgals?\b|(?<=[\[(])\s*g\s*(?=[\])])|(?<=\bin )g\b",
+    re.IGNORECASE,
+)
 
 
 def check_comments(text: RecordText, count: int, choices: Choices) -> None:
@@ -31,17 +34,24 @@ def check_comments(text: RecordText, count: int, choices: Choices) -> None:
     line that contradicts them.
     """
     for index, line in enumerate(text.lines[:count]):
-        step, unit = _STEP.search(line), _UNIT.search(line)
-        if step is not None and choices.dt is not None and not isclose(value_of(step[1]), choices.dt, rel_tol=1e-6):
-            raise text.refusal(index, f"it states {step[0]}, but dt={choices.dt:g} was specified; correct one of them")
-        stated = None if unit is None else spelled(unit[0])
+        step = _STEP.search(line)
+        if step is not None and choices.dt is not None:
+            seconds = value_of(step[1]) * (1e-3 if step[2] else 1.0)
+            if not isclose(seconds, choices.dt, rel_tol=1e-6):
+                said = step[0].strip()
+                raise text.refusal(index, f"it states {said}, but dt={choices.dt:g} was specified; correct one of them")
+        # a line may mention several units, as of a conversion
+        stated = [unit for found in _UNIT.findall(line) if (unit := spelled(found)) is not None]
         given = None if choices.unit is None else spelled(choices.unit)
-        if stated is not None and given is not None and UNITS[stated] != UNITS[given]:
-            raise text.refusal(index, f"it states {stated}, but unit={given} was specified; correct one of them")
+        if stated and given is not None and UNITS[given] not in [UNITS[unit] for unit in stated]:
+            named = " and ".join(dict.fromkeys(stated))
+            raise text.refusal(index, f"it states {named}, but unit={given} was specified; correct one of them")
 
 
 _COMMENT = ("%", "#")
 _HEADING = re.compile(r"^(?P<name>.*?)\s*[\[(]\s*(?P<unit>[^\])]+?)\s*[\])]\s*$")
+_OTHER = re.compile(r"\s*[cm]?m(?:/s(?:ec)?)?\s*", re.IGNORECASE)
+"""Units of displacement and velocity; other remarks in brackets may be no units at all."""
 _RISING = 0.9
 """Fraction of rising steps from which the first column counts as time; its steps must then all be equal."""
 
@@ -74,7 +84,7 @@ def read(text: RecordText, choices: Choices) -> Reading:
     time = _is_time(table.values)
     column = _column(text, choices, table, time)
     name, unit = _heading(table.headings[column]) if table.headings else ("", None)
-    if unit is not None and spelled(unit) is None:
+    if unit is not None and spelled(unit) is None and (choices.unit is None or _OTHER.fullmatch(unit)):
         raise text.refusal(
             table.first - 1, f"column {column + 1} is in {unit}, which is not a known unit of acceleration"
         )
@@ -164,17 +174,18 @@ def _step(text: RecordText, table: _Table) -> float:
     digit = max(place(text.lines[k].split(table.separator)[0].strip()) for k in ends)
     # two rounded times may each be off by half a unit of the last digit; a tolerance of more than half a step could
     # hide a gap
-    rounding = digit * (1.0 + _EQUAL) if digit <= 0.5 * usual else _EQUAL * usual
+    exact = _EQUAL * usual
+    rounding = max(digit * (1.0 + _EQUAL), exact) if digit <= 0.5 * usual else exact
     dt = float(time[-1] - time[0]) / steps.size
     wrong = np.flatnonzero(np.abs(steps - usual) > rounding)
     drift = np.abs(time - time[0] - dt * np.arange(time.size))
-    if wrong.size or drift.max() > max(rounding, _EQUAL * usual):
+    if wrong.size or drift.max() > rounding:
         at = int(wrong[0]) + 1 if wrong.size else int(drift.argmax())
         problem = f"the times up to this one do not have a constant step of {usual:g} s"
         raise text.refusal(table.first + at, f"{problem}: there is a gap, or the times have too few digits")
     # restore the intended step: 0.01 instead of 0.00999999999
     meant = float(f"{dt:.9g}")
-    return meant if abs(meant - dt) * steps.size <= digit else dt
+    return meant if abs(meant - dt) * steps.size <= max(digit, 4.0 * float(np.spacing(abs(time[-1])))) else dt
 
 
 def _column(text: RecordText, choices: Choices, table: _Table, time: bool) -> int:

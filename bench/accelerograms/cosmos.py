@@ -1,8 +1,9 @@
 """COSMOS files, version 1.20 (`.V1c`, `.V2c`): text, integers, reals and comments, then one quantity of one channel.
 
-Each part begins with the number of lines or values that follow and their format. Real 34 is the time step [s]. A file
-may contain several channels, with the velocity and displacement of each. Source: COSMOS Strong Motion Programs Board,
-"COSMOS strong motion data format", version 1.20, August 15, 2001.
+Each part begins with the number of lines or values that follow and their format. Real 62 is the time step [ms] of the
+samples; where it is absent, real 34 is used, that of the recorder [s], because processed records may have been
+resampled. A file may contain several channels, with the velocity and displacement of each. Source: COSMOS Strong Motion
+Programs Board, "COSMOS strong motion data format", version 1.20, August 15, 2001.
 """
 
 import re
@@ -28,8 +29,13 @@ _DATA = re.compile(
 )
 _END = re.compile(r"^\s*End-of-data", re.IGNORECASE)
 _PEAK = re.compile(rf"^\s*Processed:.*?Max\s*=\s*({NUMBER})\s+(\S+)", re.IGNORECASE)
-_STEP = 34
-"""Position of the time step among the reals, counted from 1."""
+_STEP, _RECORDER = 62, 34
+"""Positions of the time step of the samples [ms], and of that of the recorder [s], among the reals, counted from 1."""
+_DURATION = re.compile(rf"\bapprox\s+({NUMBER})\s*sec", re.IGNORECASE)
+_ROUNDED, _ABOUT = 1.5, 0.02
+"""Largest difference between the duration of the samples and the stated one, which is rounded: a time [s], and a
+fraction in addition.
+"""
 
 
 class _Block(NamedTuple):
@@ -57,6 +63,7 @@ def read(text: RecordText, choices: Choices) -> Reading:
     unit = acceleration_unit(text, channel.data, head["unit"])
     count = count_in(text, channel.data, head["count"])
     dt = _step(text, channel)
+    _check_duration(text, channel.data, count * dt, dt)
     samples = numbers(text, channel.data + 1, channel.last, count, int(head["width"]))
     header = text.lines[channel.first : channel.data]
     for index, line in enumerate(header, channel.first):
@@ -83,11 +90,26 @@ def _step(text: RecordText, channel: Channel) -> float:
         if reals is not None:
             values = numbers(text, index + 1, index + 1 + int(reals[2]), int(reals[1]), int(reals[3])).values
             if values.size >= _STEP and values[_STEP - 1] > 0.0:
-                return float(values[_STEP - 1])
+                return float(values[_STEP - 1]) / 1e3
+            if values.size >= _RECORDER and values[_RECORDER - 1] > 0.0:
+                return float(values[_RECORDER - 1])
             raise text.refusal(index, f"real number {_STEP}, the time step, is missing or not positive")
     raise text.refusal(
         channel.first, "the real numbers, which include the time step, are missing; download the file again"
     )
+
+
+def _check_duration(text: RecordText, index: int, duration: float, dt: float) -> None:
+    """Raise InvalidInput if the line at `index` states another duration [s] than that of the samples."""
+    found = _DURATION.search(text.lines[index])
+    if found is not None:
+        stated = value_of(found[1])
+        if abs(duration - stated) > _ROUNDED + _ABOUT * stated:
+            raise text.refusal(
+                index,
+                f"it states {stated:g} s, but with the step of the header, {dt:g} s, its samples last {duration:.4g} s:"
+                " correct the header, or download the file again",
+            )
 
 
 def _channels(text: RecordText) -> list[Channel]:

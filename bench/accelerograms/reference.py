@@ -9,17 +9,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from bench.accelerograms.accelerogram import Accelerogram
+from bench.accelerograms.choices import LONGEST_STEP, SHORTEST_STEP
 from bench.accelerograms.read import read_accelerogram
 from bench.accelerograms.units import unit_of
 from bench.config.numbers import read_number
 from sim.errors import InvalidInput
 
 GRAMMAR = "FILE[@KEY=VALUE,...] with the keys unit, dt, channel, column and name, or synthetic:NAME[:SEED]"
-
-SHORTEST_STEP, LONGEST_STEP = 1e-4, 0.5
-"""Plausible range of a record's time step [s], with a margin: strong motion is sampled at 50 to 1000 Hz, old film
-records at 10 Hz or more.
-"""
 
 _SYNTHETIC = "synthetic:"
 _KEYS = ("unit", "dt", "channel", "column", "name")

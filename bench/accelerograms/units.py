@@ -15,7 +15,9 @@ _SPELLINGS = {"g's": "g", "gals": "gal"}
 
 def spelled(text: str) -> str | None:
     """The unit of `UNITS` denoted by `text` (`cm/sec/sec`, `CM/S^2`, `m/s**2`), or None."""
-    word = re.sub(r"\s+|\*\*|\^|[.,;]$", "", text.strip().lower()).replace("sec", "s").replace("/s/s", "/s2")
+    # a superscript two in Latin-1, and in UTF-8 read as Latin-1
+    word = re.sub("\u00e2\u00b2|\u00b2", "2", text.strip().lower())
+    word = re.sub(r"\s+|\*\*|\^|[.,;]$", "", word).replace("sec", "s").replace("/s/s", "/s2")
     word = _SPELLINGS.get(word, word)
     return word if word in UNITS else None
 

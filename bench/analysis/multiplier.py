@@ -103,13 +103,17 @@ def dominant_multiplier(series: Array) -> Multiplier | None:
     """Pair of multipliers with the largest modulus, among those that contribute substantially to `series`, shape (n,
     m): coefficients of successive cycles at a constant drive.
 
-    None if there are fewer than `SHORTEST` cycles, or if no pair is significant. Raises ValueError for values that are
+    None if there are too few cycles for a second estimate without the first ones, from at least `SHORTEST` cycles, or
+    if no pair is significant. Raises ValueError for values that are
     not finite.
     """
     if not np.isfinite(series).all():
         raise ValueError("the series of coefficients has values that are not finite")
+    late = series[series.shape[0] // EARLY :]
+    if late.shape[0] < SHORTEST:
+        return None
     found = _dominant(series)
-    later = None if found is None else _dominant(series[series.shape[0] // EARLY :])
+    later = None if found is None else _dominant(late)
     if found is None or later is None:
         return found
     return replace(

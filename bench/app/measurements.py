@@ -17,9 +17,10 @@ from bench.analysis.signals import SIGNALS, SignalMap
 from bench.app.export.format import TableColumn, content_of
 from bench.config.model import BenchConfiguration
 from bench.datafile.reader import DataFile, JournalEntry, open_datafile
+from bench.datafile.resting import rows_at_rest, run_starts
 from bench.document.campaign import Campaign as Contents
 from bench.document.typography import counted
-from bench.events import SpecimenMounted, State, StateChanged
+from bench.events import SpecimenMounted
 from bench.results import FILE
 from sim.errors import InvalidInput
 from sim.specimen import Specimen
@@ -187,7 +188,7 @@ class Campaign:
         """The runs in the file so far, in order."""
         mounted = self._file.entries_of(SpecimenMounted)
         found: list[Run] = []
-        for run, start in zip(self._file.runs, self._starts(), strict=True):
+        for run, start in zip(self._file.runs, run_starts(self._file), strict=True):
             stop = start + float(run.time[-1]) + 1.0 / self.sample_rate
             # the specimen is mounted before the rig is armed; both times agree within a block
             springs = [row["beta"] for row in mounted if row["time"] < 0.5 * (start + stop)]
@@ -228,7 +229,8 @@ class Campaign:
             if first < last:
                 rows = slice(stored.rows.start + int(first), stored.rows.start + int(last))
                 times.append(time[first:last])
-                values.append(self._signal(signal, rows, self._rest(each, stored.rows.start)))
+                rest = self.parameters.get("rest", REST)
+                values.append(self._signal(signal, rows, rows_at_rest(self._file, stored.rows.start, rest)))
         unit = self.signals[signal]
         return Samples(np.concatenate(values), unit, Quantity(np.concatenate(times), "s"), signal)
 
@@ -245,26 +247,6 @@ class Campaign:
     def _channels(self, rows: slice) -> NDArray[np.float64]:
         """Values of all channels, shape (n, n_channels)."""
         return np.column_stack([self._file.values(channel.name, rows) for channel in self._file.channels])
-
-    def _rest(self, run: Run, begin: int) -> slice:
-        """Rows at rest whose mean is the zero of the run that starts at row `begin`; empty if no zero was taken."""
-        half = 0.5 / self.sample_rate
-        for row in self._file.entries_of(StateChanged):
-            taken = (row["before"], row["after"]) == (State.ARMED, State.RUNNING)
-            if taken and run.start + half < row["time"] <= run.stop + half:
-                end = begin + round((row["time"] - run.start) * self.sample_rate)
-                return slice(max(begin, end - round(self.parameters.get("rest", REST) * self.sample_rate)), end)
-        return slice(begin, begin)
-
-    def _starts(self) -> list[float]:
-        """Bench time of the first sample of each run [s], from the times of the blocks, which are those of their last
-        samples.
-        """
-        blocks, rows, rate = self._file.blocks, self._file.rows, self.sample_rate
-        ends = np.append(blocks["row"][1:], rows)
-        first = np.flatnonzero(np.diff(blocks["run"], prepend=-1))
-        length = ends[first] - blocks["row"][first] + blocks["first"][first]
-        return (blocks["time"][first] - length / rate).tolist()
 
     @cached_property
     def _map(self) -> SignalMap:

@@ -11,6 +11,7 @@ from bench.analysis.laser_calibration import LaserCalibration
 from bench.bounded import read_bounded, require_shallow
 from bench.config.validation import dotted, validated
 from bench.provenance import software
+from bench.unfinished import write_new
 from sim.errors import InvalidInput
 from sim.identified import Identified, unit
 
@@ -27,16 +28,14 @@ class KeptFile:
     remedy: str
 
     def write(self, path: Path, content: Mapping[str, Any]) -> None:
-        """Write header and `content` to a new JSON file. Raises InvalidInput if `path` exists or cannot be written."""
+        """Write header and `content` to a new JSON file. Raises InvalidInput if `path` exists, and RockbenchError if it
+        cannot be written; it does not exist then.
+        """
         head = dict(zip(_HEAD, (self.format, self.version, software()["rocking-bench"]), strict=True))
         text = json.dumps({**head, **content}, indent=1, ensure_ascii=False, allow_nan=False)
-        try:
-            with path.open("x", encoding="utf-8", newline="\n") as file:
-                file.write(text + "\n")
-        except FileExistsError:
-            raise InvalidInput(self.item, str(path), "the file exists and is never overwritten") from None
-        except OSError as error:
-            raise InvalidInput(self.item, str(path), f"the file cannot be written: {error.strerror}") from None
+        if path.exists():
+            raise InvalidInput(self.item, str(path), "the file exists and is never overwritten")
+        write_new(path, lambda unfinished: unfinished.write_text(text + "\n", encoding="utf-8", newline="\n"))
 
     def read(self, path: Path) -> dict[str, Any]:
         """Contents of a file without its header. Raises InvalidInput if the file cannot be read, or if its format or

@@ -174,6 +174,9 @@ QUIET, CAPTURED = 0.01, 24
 """Largest control of a captured motion, as a share, and number of successive cycles in which it must not be exceeded.
 """
 
+UNLIMITED = 0.1
+"""Largest control of a captured motion, as a fraction of the authority; a control that is limited is not small."""
+
 LOST, ROUGH = 6, 0.5
 """A captured motion counts as lost after this number of successive cycles in which the control exceeds this fraction of
 the authority.
@@ -239,7 +242,7 @@ class HoldMonitor:
             return _change(achieved / expected, self.omega)
         controls = list(self._controls)
         if self.captured_after is None:
-            if len(controls) == CAPTURED and max(controls) <= QUIET:
+            if len(controls) == CAPTURED and max(controls) <= min(QUIET, UNLIMITED * self.authority):
                 self.captured_after = self.cycles - CAPTURED
         elif min(controls[-LOST:]) > ROUGH * self.authority:
             return "the deviation grew again after the capture"

@@ -41,6 +41,10 @@ LONGEST_AGE = timedelta(hours=12)
 """Default age after which a model is rejected, because the temperatures of coil and guides change."""
 
 
+ROUNDING = 1e-9
+"""Relative tolerance at the ends of the band: its lines are rounded multiples of a resolution."""
+
+
 class TableModel(Parameters):
     """Table acceleration per drive [m/s2/V] at ascending frequencies; all arrays have shape (n_lines,).
 
@@ -141,7 +145,7 @@ class TableModel(Parameters):
 
     def _require(self, frequency: Array) -> None:
         low, high = self.band
-        outside = frequency[(frequency < low) | (frequency > high)]
+        outside = frequency[(frequency < low * (1.0 - ROUNDING)) | (frequency > high * (1.0 + ROUNDING))]
         if outside.size:
             allowed = f"the table model is valid from {low:g} to {high:g} Hz; identify the table in a wider band"
             raise InvalidInput("frequency", float(outside[0]), allowed)

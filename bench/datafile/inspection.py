@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from bench.datafile import hdf5
-from bench.datafile.access import is_let_go
 from bench.datafile.checksums import GROUP, added, integrity
 from bench.datafile.declared import part_of
 from bench.datafile.fields import decode
@@ -135,8 +134,7 @@ def verify(path: Path, done: Done = lambda _done, _all: None) -> Verdict:
 
     Raises InvalidInput for a file of another kind, and DataFileError for a file that cannot be opened.
     """
-    judging = path.is_file() and not is_let_go(path)
-    with open_file(path, judging=judging, kinds=(FORMAT, ANALYSIS)) as file:
+    with open_file(path, judging=None, kinds=(FORMAT, ANALYSIS)) as file:
         try:
             entry = hdf5.group(file, "entry")
             stored = [*hdf5.datasets(entry)]

@@ -79,9 +79,10 @@ _HINT = "`rockbench file recover` restores the readable part"
 
 
 def open_file(
-    path: Path, *, judging: bool = False, kinds: tuple[str, ...] = (FORMAT,), only: Sequence[str] = ()
+    path: Path, *, judging: bool | None = False, kinds: tuple[str, ...] = (FORMAT,), only: Sequence[str] = ()
 ) -> hdf5.File:
-    """Open a file of one of the `kinds`; see `bench.datafile.reader.open_datafile`. `only` names the members of
+    """Open a file of one of the `kinds`; see `bench.datafile.reader.open_datafile`. With `judging` None, a file that
+    its writer has not closed is opened to be judged. `only` names the members of
     /entry that the caller reads, so that only these are checked; by default, all are.
     """
     if path.is_dir():
@@ -98,9 +99,9 @@ def open_file(
     return file
 
 
-def _opened(path: Path, judging: bool) -> hdf5.File:
+def _opened(path: Path, judging: bool | None) -> hdf5.File:
     try:
-        if judging:
+        if judging or (judging is None and not is_let_go(path)):
             return hdf5.open_to_judge(path)
         if not is_let_go(path):
             _rehearse(path)

@@ -165,7 +165,7 @@ class SampleReader:
         """The values received in `run` from the sensor of channel `name`, if its clock is free-running; otherwise
         empty.
         """
-        sensor = [channel.name for channel in self.channels].index(self._channel_named(name).name)
+        sensor = self._number_of(name)
         columns = ("index", "time", "code", "arrival")
         found = {column: [np.zeros(0, np.int64)] for column in columns}
         if hdf5.has(self._entry, RAW):
@@ -177,6 +177,15 @@ class SampleReader:
                 for column in columns if chosen.any() else ():
                     found[column].append(hdf5.read(hdf5.dataset(table, column), part)[chosen])
         return RawValues(name, *(np.concatenate(found[column]) for column in columns))
+
+    def _number_of(self, name: str) -> int:
+        """Number of a channel in the rig. A recovered file has the groups of all channels of the rig, but no counts of
+        a channel whose conversion is lost.
+        """
+        known = self._channel_named(name).name
+        rig = [each for each in hdf5.names(self._instrument) if hdf5.has(self._instrument, f"{each}/measurement")]
+        channels = [channel.name for channel in self.channels]
+        return (rig if known in rig else channels).index(known)
 
     @cached_property
     def counted(self) -> Mapping[str, int]:

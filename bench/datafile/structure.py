@@ -34,8 +34,9 @@ UNPACKED = 200
 """Largest ratio of the size of all values to that of the file; constant columns are compressed about a hundredfold."""
 SPARE = 2**26
 """Size of values [bytes] that is allowed in addition to the ratio `UNPACKED`, so that small files pass."""
-FILTERS = frozenset({1, 2, 3})
-"""Compression, shuffling and checksum filters built into HDF5; HDF5 would load any other filter as a plug-in."""
+FILTERS = frozenset({1, 2, 3, h5py.h5z.FILTER_LZF})
+"""Compression, shuffling and checksum filters built into HDF5, and LZF, which is built into h5py and compresses the
+files of format 1; HDF5 would load any other filter as a plug-in."""
 KINDS = frozenset("iufSb")
 """NumPy kinds of allowed values: numbers, fixed-length strings, Booleans."""
 

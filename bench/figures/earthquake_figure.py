@@ -48,13 +48,16 @@ class MotionPicture:
 
 @dataclass(frozen=True, eq=False)
 class DriftPicture:
-    """Measured and predicted drift [m] under one record at intervals of `dt` [s]; `beta` is None for the bare frame."""
+    """Drift [m] under one record: measured at intervals of `dt` [s], predicted at intervals of `predicted_dt` [s].
+    `beta` is None for the bare frame.
+    """
 
     name: str
     beta: float | None
     dt: float
     measured: Array
     predicted: Array
+    predicted_dt: float
 
 
 def gain_figure(points: Sequence[PointLike], prediction: Mapping[str, NDArray[Any]]) -> "Figure":
@@ -192,7 +195,7 @@ def _draw_points(panel: "Axes", rows: list[dict[str, Any]]) -> None:
 def _draw_drift(panel: "Axes", drift: DriftPicture, colour: str, width: float, name: str) -> None:
     time = drift.dt * np.arange(drift.measured.size)
     panel.plot(time, 1e3 * drift.measured, color=colour, linewidth=width, label=f"{name}, measured")
-    predicted = drift.dt * np.arange(drift.predicted.size)
+    predicted = drift.predicted_dt * np.arange(drift.predicted.size)
     panel.plot(
         predicted,
         1e3 * drift.predicted,

@@ -85,7 +85,8 @@ class Guard:
         self._make_watches()
         self._warmed = 0.0, 0.0
         """Exponential mean of the squared coil current [A2] at the end of the last armed period, and its time [s]."""
-        self._last_read = 0.0
+        self._first_read = 0.0, 0
+        """Time at which the first block since arming had been read [s], and its number of samples."""
         self._ramp_samples: int | None = None
         self._ramp_done = 0
         self._ramp_from = 1.0
@@ -111,7 +112,8 @@ class Guard:
             raise SafetyInputOpen(f"arming is refused: {', '.join(opened)} open; {closing}", opened)
         if self._expected:
             # the coil is still warm; an attempt to arm that failed has read nothing
-            self._warmed = self._motion.heat, self._last_read
+            begun, samples = self._first_read
+            self._warmed = self._motion.heat, begun + (self._expected - samples) / self._rig.sample_rate
         self._ramp_samples, self._ramp_done, self._ramp_from = None, 0, 1.0
         self._command, self._sent, self._held, self._expected = 0.0, 0.0, None, 0
         self._sending, self._owed, self._zeros = False, 0, 0
@@ -156,14 +158,15 @@ class Guard:
         played, self._waiting = queue[: volts.size], queue[volts.size :]
         over = self.ramping and self._gain(0) == 0.0 and not self._waiting.any()
         self._zeros = self._zeros + volts.size if over else 0
-        self._last_read = self._rig.clock.now()
+        now = self._rig.clock.now()
         if self._expected == len(block):
-            self._motion.warm(self._remaining_heat(len(block)))
+            self._first_read = now, len(block)
+            self._motion.warm(self._remaining_heat())
         values, extremes = self._conversion.of(block.counts)
         signals = self._signals_of(values)
         exceeded, near = self._motion.check(block.first, values, signals, extremes)
         exceeded += self._sensors.check(block.first, block.counts, values, played, extremes)
-        exceeded += self._time.check(self._last_read, self._expected)
+        exceeded += self._time.check(now, self._expected)
         exceeded.sort(key=lambda violation: (not violation.cuts, violation.sample))
         seen = exceeded[0] if exceeded else None
         if seen is not None:
@@ -261,14 +264,15 @@ class Guard:
         self._sensors = SensorWatch(self._channels, rate, self._limits)
         self._time = TimeWatch(rate, self._limits)
 
-    def _remaining_heat(self, samples: int) -> float:
-        """Exponential mean of the squared current [A2] at the beginning of the first block, with `samples` samples.
+    def _remaining_heat(self) -> float:
+        """Exponential mean of the squared current [A2] at the beginning of the first block.
 
-        The pause before it counts in whole seconds, so that a replay, whose blocks arrive some milliseconds earlier or
-        later, begins with the same value.
+        The times of later blocks follow from their samples, as in a replay, and the pause counts in whole seconds, so
+        that a replay begins with the same value.
         """
         heat, since = self._warmed
-        pause = max(self._last_read - since - samples / self._rig.sample_rate, 0.0)
+        begun, samples = self._first_read
+        pause = max(begun - samples / self._rig.sample_rate - since, 0.0)
         return heat * exp(-float(np.floor(pause)) / self._limits.heating_time)
 
     def _begin(self, duration: float) -> None:

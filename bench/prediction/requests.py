@@ -2,9 +2,10 @@
 
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, field_validator
+from pydantic import Field, field_validator, model_validator
 
 from bench.config.numbers import spaced
+from sim.errors import InvalidInput
 from sim.parameters import COUPLING, Parameters, each_once, quantity
 
 Frequency = Annotated[float, Field(gt=0, le=1000)]
@@ -80,6 +81,15 @@ class GainRequest(SineRequest):
     scheduler: str | None = quantity(
         None, "", "address of a dask.distributed scheduler that distributes the work, such as tcp://10.0.0.5:8786"
     )
+
+    @model_validator(mode="after")
+    def _require_taylor(self) -> "GainRequest":
+        asked = ("members", "outcomes", "band")
+        given = next((name for name in asked if getattr(self, name, 0)), None)
+        if self.solver != "taylor" and given is not None:
+            allowed = f"only the solver taylor computes this, not {self.solver}: omit one of the two options"
+            raise InvalidInput(given, getattr(self, given), allowed)
+        return self
 
 
 class SteadyRequest(GainRequest):

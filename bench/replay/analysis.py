@@ -67,11 +67,13 @@ def carry_out(
     """Carry out a plan with `changed` settings on the recorded samples. Returns the replay and its points.
 
     `configuration` is the recorded one. Raises DriveChanged if the plan with these settings would have driven the
-    table differently, because the recorded motion is not the response to that drive.
+    table differently, because the recorded motion is not the response to that drive, or for longer.
     """
     replayed = replay(record, changed.plan(), configuration, clock=VirtualClock(), subscribers=subscribers)
     if (why := replayed.first_difference(DRIVE)) is not None:
         raise DriveChanged(f"these settings would change the drive of the table ({why}): repeat the measurement")
+    if replayed.beyond is not None:
+        raise DriveChanged(f"these settings need more than was recorded ({replayed.beyond}): repeat the measurement")
     return replayed, replayed.points
 
 
@@ -99,14 +101,23 @@ class Analysis:
     configuration: BenchConfiguration
 
 
-def write_analysis(original: Path, record: DataFile, analysis: Analysis, out: Path | None = None) -> Path:
+def write_analysis(
+    original: Path,
+    record: DataFile,
+    analysis: Analysis,
+    out: Path | None = None,
+    companions: Callable[[Path], Sequence[Path]] = lambda _path: (),
+) -> Path:
     """Write the results to a new file and return its path.
 
-    Without `out`, the file is `<name>.analysis-<n>.h5` in the original's folder, with the first free n. Raises
-    InvalidInput if `out` exists or cannot be created, and DataFileError if the disk fails.
+    Without `out`, the file is `<name>.analysis-<n>.h5` in the original's folder, with the first n for which neither the
+    file exists nor one of its `companions`, which the caller writes. Raises InvalidInput if `out` exists or cannot be
+    created, and DataFileError if the disk fails.
     """
     digest = file_hash(original)
     for path in [out] if out is not None else _names(original):
+        if out is None and any(each.exists() for each in companions(path)):
+            continue
         try:
             file = hdf5.create(path)
         except FileExistsError:

@@ -118,7 +118,7 @@ class Comparison:
         same = self._course.same_wording, self._course.same_intervals
         _compare_rows(found, POINTS, self._record.points, self._points, *same)
         for path, rows in self._own.items():
-            if path == TwinEstimate.table and not self._course.twin_in_time:
+            if path == TwinEstimate.table and not (self._course.twin_in_time and self._course.same_intervals):
                 continue
             stored = self._course.rows_of(path)
             if stored is None:

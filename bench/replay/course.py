@@ -79,9 +79,13 @@ class RecordedCourse:
         kinds = {each.kind for each in self.journal}
         self._unknown = () if SpecimenMounted.__name__ in kinds else (SpecimenMounted,)
         self._opened: dict[int, tuple[int, list[str]]] = {}
+        armed_at = 0
         for entry in self.journal:
+            if entry.columns.get("after") == State.ARMED:
+                armed_at = entry.blocks
             opened = entry.columns.get("code") == CauseCode.SAFETY_INPUT and entry.columns["after"] == State.HALTED
-            if opened and entry.blocks > 0:
+            # an arming that was refused has no block: the last one belongs to the run before it
+            if opened and entry.blocks > armed_at:
                 run = int(np.searchsorted(self._numbers, int(blocks["run"][entry.blocks - 1])))
                 self._opened[run] = int(ends[entry.blocks - 1]), entry.columns["subject"].split(", ")
 

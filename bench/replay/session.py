@@ -105,7 +105,8 @@ class Replayed:
     a killed program, neither of which recorded data can reproduce. `in_place` lists violations that the samples do not
     contain; the replay makes abort requests in their place. `played` of `rows` samples were requested. `same_wording`
     is False for a file with other message texts, and `same_intervals` for one with another evaluation of uncertainties;
-    texts or uncertainties are then not compared. `returned` is the result of the plan, or None if the plan did not end
+    texts or uncertainties are then not compared. `beyond` states what the plan requested after the end of a complete
+    recording, or is None. `returned` is the result of the plan, or None if the plan did not end
     by itself.
     """
 
@@ -121,6 +122,7 @@ class Replayed:
     same_wording: bool
     same_intervals: bool
     returned: object = None
+    beyond: str | None = None
 
     def first_difference(self, part: str) -> str | None:
         """First difference in `part` that is larger than rounding, or None."""
@@ -189,6 +191,7 @@ def replay(
         same_wording=course.same_wording,
         same_intervals=course.same_intervals,
         returned=engine.returned,
+        beyond=over if broke_off is None else None,
     )
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
+from bench.analysis.sensor_accuracy import SensorUncertainty
 from bench.analysis.signals import ACCELERATION, DISPLACEMENT, LASER_1, LASER_2
 from bench.analysis.transient_base import MODEL_RATE
 from bench.config.model import BenchConfiguration
@@ -161,14 +162,13 @@ class Setting:
     """Sample rate and sensors of the bench.
 
     `on_ground`: the lasers' signals include the table's displacement. `lag` contains the delays of the lasers relative
-    to the table's accelerometer and displacement sensor [s], `linearity` the largest linearity errors of the lasers of
-    storeys 1 and 2 [m].
+    to the table's accelerometer and displacement sensor [s], `sensors` the uncertainty of the sensors.
     """
 
     sample_rate: float
     on_ground: bool
     lag: tuple[float, float]
-    linearity: tuple[float, float]
+    sensors: SensorUncertainty
 
 
 class NoEstimate(RockbenchError):
@@ -188,9 +188,10 @@ class Estimator:
         dt = self._resampler.dt
         self._latency = self._resampler.latency + lasers
         self._ensemble, self._gains = Ensemble(members, dt), Gains(members, dt)
-        first, second = setting.linearity
-        self._uncertainties = np.array([first, second, np.hypot(first, second)])
-        self._residual = Residual(dt, float(self._uncertainties[2]))
+        accuracy, ranges = setting.sensors.accuracy, setting.sensors.ranges
+        # differences below the errors of a data sheet are not significant, even if a calibration has found the errors
+        self._residual = Residual(dt, float(np.hypot(*ranges)) * accuracy.laser_linearity)
+        self._uncertainties, self._of_peak = np.zeros(3), 0.0
         self._peaks = np.zeros(len(members.specimens))
         self._measured_peak = 0.0
         self._every, self._skip = max(round(_TRACE / dt), 1), 0
@@ -218,6 +219,9 @@ class Estimator:
         if not len(samples):
             return None
         acceleration, x, first, second = np.ascontiguousarray(samples.T)
+        one, two = (setting.sensors.linearity_amplitude(k, seen) for k, seen in enumerate((first, second)))
+        self._uncertainties = np.array([one, two, np.hypot(one, two)])
+        self._of_peak = max(self._of_peak, float(self._uncertainties[2]))
         u1 = first - x if setting.on_ground else first
         seen = np.stack((u1, u1 + second - first, second - first))
         motions = self._ensemble.feed(acceleration)
@@ -247,9 +251,7 @@ class Estimator:
         values: dict[str, float] = {}
         for k, name in enumerate(("u1", "u2", "drift")):
             values |= _fields(name, u[k, 0, -1], low[k, -1], high[k, -1], seen[k, -1])
-        values |= _fields(
-            "drift_peak", self._peaks[0], *_band(self._peaks, self._uncertainties[2]), self._measured_peak
-        )
+        values |= _fields("drift_peak", self._peaks[0], *_band(self._peaks, self._of_peak), self._measured_peak)
         values |= _fields("alpha_2", alphas[0], *_band(alphas, 0.0), stated)
         return TwinEstimate(
             time=time,

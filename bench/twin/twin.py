@@ -113,10 +113,9 @@ class Twin:
 
         self._configuration = configuration
         self._publish, self._requests, self._patient = publish, requests, patient
-        first, second = (configuration.sensors.linearity_amplitude(laser, np.zeros(1)) for laser in range(2))
         on_ground = configuration.laser_reference == "ground"
         lag = laser_lag(configuration)
-        self._setting = Setting(sample_rate, on_ground, lag, (first, second))
+        self._setting = Setting(sample_rate, on_ground, lag, configuration.sensors)
         block = configuration.block_samples / sample_rate
         self._late, self._most = max(round(_LATE / block), 2), max(round(_BEHIND / block), 5)
         self._applicability = Applicability()

@@ -100,11 +100,12 @@ class EarthquakeCampaign(Prepared[EarthquakeParameters]):
 
         def motions(path: Path) -> None:
             asked = kept.requested.items()
-            write_figure(path, motion_figure([MotionPicture(name, STEP, a, kept.achieved[name]) for name, a in asked]))
+            pictures = [MotionPicture(name, kept.interval, a, kept.achieved[name]) for name, a in asked]
+            write_figure(path, motion_figure(pictures))
 
         def drifts(path: Path) -> None:
             shown = [
-                DriftPicture(name, beta, STEP, each.measured, each.predicted)
+                DriftPicture(name, beta, kept.interval, each.measured, each.predicted, STEP)
                 for (name, beta), each in kept.drifts.items()
             ]
             write_figure(path, drift_figure(shown))

@@ -278,7 +278,9 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class DriftHistory:
-    """Measured and predicted drift [m], every `STEP` seconds; the predicted history ends when the model topples."""
+    """Drift [m]: measured, every `Histories.interval` seconds, and predicted, every `STEP` seconds up to the time at
+    which the model topples.
+    """
 
     measured: Array
     predicted: Array
@@ -287,7 +289,7 @@ class DriftHistory:
 @dataclass(eq=False)
 class Histories:
     """Histories for the figures of a campaign: accelerations of the table [m/s2], and drifts by record and stiffness
-    ratio (None for the bare frame).
+    ratio (None for the bare frame). `interval` is the time between measured values [s], about `STEP`.
     """
 
     requested: dict[str, Array] = field(default_factory=dict[str, Array])
@@ -295,9 +297,11 @@ class Histories:
     drifts: dict[tuple[str, float | None], DriftHistory] = field(
         default_factory=dict[tuple[str, float | None], DriftHistory]
     )
+    interval: float = STEP
 
     def bare(self, shaking: Shaking, signals: Array, predicted: Array) -> None:
         every = _every(shaking)
+        self.interval = every / shaking.target.sample_rate
         self.requested[shaking.name] = shaking.target.acceleration[::every]
         self.achieved[shaking.name] = signals[: shaking.target.acceleration.size : every, ACCELERATION]
         self.drifts[shaking.name, None] = DriftHistory(signals[::every, DRIFT], predicted)

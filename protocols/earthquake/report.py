@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from bench.analysis.signals import ACCELERATION, DRIFT, SignalMap
 from bench.config.validation import validated
 from bench.datafile.reader import DataFile
+from bench.datafile.resting import rows_at_rest
 from bench.datafile.tables import arrays
 from bench.document.campaign import Campaign
 from bench.document.document import Column, Listing, Notice, Part, Picture, Section, Table
@@ -199,9 +200,6 @@ def _statement(campaign: Campaign, points: Sequence[Mapping[str, Any]]) -> list[
 
 Floats = NDArray[np.float64]
 
-QUIET = 0.75
-"""Fraction of the time at rest at the start of a run from which the zero of the signals is taken."""
-
 
 @dataclass(frozen=True)
 class Played:
@@ -243,14 +241,15 @@ def played_records(record: DataFile) -> list[Played]:
 
 
 def signals_of(record: DataFile, signals: SignalMap, played: Played, rest: float) -> Floats:
-    """Signals of a played record, shape (n, n_signals), relative to their values at rest; each run begins with `rest`
-    seconds at rest.
+    """Signals of a played record, shape (n, n_signals), relative to their values in the `rest` seconds at rest before
+    the drive.
     """
 
     def values(start: int, stop: int) -> Floats:
         return np.column_stack([record.values(channel.name, slice(start, stop)) for channel in record.channels])
 
-    signals.tare(values(played.run, played.run + round(QUIET * rest * record.sample_rate)))
+    still = rows_at_rest(record, played.run, rest)
+    signals.tare(values(still.start, still.stop))
     return signals.of(values(played.start, played.stop))
 
 
@@ -275,6 +274,7 @@ def histories_parts(campaign: Campaign) -> list[Part]:
     except InvalidInput as refused:
         return [Notice(f"Histories are not drawn because the records cannot be prepared: {refused}.")]
     every = max(round(STEP * record.sample_rate), 1)
+    interval = every / record.sample_rate
     motions: list[MotionPicture] = []
     drifts: list[DriftPicture] = []
     for name in names:
@@ -286,10 +286,15 @@ def histories_parts(campaign: Campaign) -> list[Part]:
             if play.beta is None:
                 asked = shaking.target.acceleration
                 achieved = shown[: asked.size : every, ACCELERATION]
-                motions.append(MotionPicture(name, STEP, asked[::every][: achieved.size], achieved))
+                motions.append(MotionPicture(name, interval, asked[::every][: achieved.size], achieved))
             drifts.append(
                 DriftPicture(
-                    name, play.beta, STEP, shown[::every, DRIFT], _predicted_drift(campaign, shaking, play, shown)
+                    name,
+                    play.beta,
+                    interval,
+                    shown[::every, DRIFT],
+                    _predicted_drift(campaign, shaking, play, shown),
+                    STEP,
                 )
             )
     parts: list[Part] = []

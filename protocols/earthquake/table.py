@@ -6,7 +6,7 @@ from math import ceil, tau
 from pathlib import Path
 
 from bench.config.model import BenchConfiguration
-from bench.control.table_model import TableModel
+from bench.control.table_model import ROUNDING, TableModel
 from bench.control.target import FLAT, REACH
 from protocols.common.identification.parameters import IdentifyParameters
 from protocols.common.identification.plan import expected_duration
@@ -40,7 +40,8 @@ def stored_table(
     model.require_rate(configuration.sample_rate)
     band = band_used(parameters, configuration)
     low, high = band[0] / REACH, band[1] * REACH
-    if model.band[0] > low or model.band[1] < high:
+    # a line of the model is a multiple of the resolution, which is rounded
+    if model.band[0] > low * (1.0 + ROUNDING) or model.band[1] < high * (1.0 - ROUNDING):
         holds = f"the table model covers {model.band[0]:g} to {model.band[1]:g} Hz"
         allowed = f"{holds}, but a record in this band needs {low:g} to {high:g} Hz: identify the table in a wider band"
         raise InvalidInput("--table-band", f"{band[0]:g}:{band[1]:g}", allowed)

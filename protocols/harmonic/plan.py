@@ -166,7 +166,7 @@ class HarmonicPlan:
                 falls += 1
                 yield from end_test(specimen, fast=True)
                 continue
-            yield from end_test(specimen, fast=isinstance(held, Fallen))
+            yield from end_test(specimen, fast=isinstance(held, Fallen) or (held is not None and held.fallen))
             if isinstance(held, Fallen):
                 held = Held(None, "the block fell")
             known, sensors = self._configuration.known_on_table, self._sensors

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from bench.analysis.signals import ACCELERATION, DRIFT, SIGNALS, U1, SignalMap
 from bench.datafile.reader import DataFile
+from bench.datafile.resting import rows_at_rest
 from bench.document.campaign import Campaign
 from bench.figures.style import (
     BLACK,
@@ -27,6 +28,7 @@ from bench.figures.style import (
     set_grid,
 )
 from bench.live_values import Estimate
+from protocols.common.sine.calibration import REST
 from sim.gain import Branch
 
 if TYPE_CHECKING:
@@ -37,9 +39,6 @@ Floats = NDArray[np.float64]
 
 PERIODS, SAMPLES = 3, 120
 """Number of periods of the drive that are drawn, and number of points per curve and period."""
-
-QUIET = 1.5
-"""Time at the start of a run from which the signals are zeroed [s]; the table does not move for the first 2 s."""
 
 BOUNDARIES = ("StepStarted", "StateChanged")
 """Events that end a dwell."""
@@ -131,10 +130,10 @@ class Dwells:
         start = int(rows[bisect_left(runs, runs[block])])
         period = tau / omega * self._record.sample_rate
         begin = stop - round((PERIODS + 1) * period)
-        rest = round(QUIET * self._record.sample_rate)
-        if begin <= start + rest:
+        still = rows_at_rest(self._record, start, REST)
+        if begin <= still.stop or still.start == still.stop:
             return None
-        self._signals.tare(self._values(start, start + rest))
+        self._signals.tare(self._values(still.start, still.stop))
         return _in_phase(self._signals.of(self._values(begin, stop)), period)
 
     def _values(self, start: int, stop: int) -> Floats:

@@ -16,11 +16,14 @@ WIDTH, HEIGHT = 7.5, 4.6
 
 
 def hold_figure(cycles: Mapping[str, Sequence[Any]], omega: float, beta: float) -> "Figure":
-    """Peak drift (above) and control (below) of each cycle of the hold at `omega` [rad/s] and `beta`.
+    """Peak drift (above) and control (below) of each cycle of the last hold at `omega` [rad/s] and `beta`.
 
     `cycles` are the columns of `protocols.common.sine.holding.HoldCycle`.
     """
     here = [k for k, at in enumerate(zip(cycles["omega"], cycles["beta"], strict=True)) if at == (omega, beta)]
+    # a hold after a further start counts its cycles from 1 again
+    begin = max((k for k, row in enumerate(here) if cycles["cycle"][row] == 1), default=0)
+    here = here[begin:]
     number, drift, control = (np.array([cycles[name][k] for k in here]) for name in ("cycle", "drift_peak", "control"))
     figure = new_figure(WIDTH, HEIGHT)
     above, below = figure.add_subplot(2, 1, 1), figure.add_subplot(2, 1, 2)

@@ -181,11 +181,11 @@ class StabilityPlan:
             yield Publish(StepStarted(f"{where}, chance {start.chance:.0%}"))
             yield Arm(REST)
             yield Calibrate(calibration)
-            point: StabilityPoint | Fallen = Fallen()
+            point, fallen = None, True
             if not isinstance((yield Sweep(start.segments)), Fallen):
-                point = yield from self._held_point(_Trial(place, sine, found, under, design), fields, where)
-            yield from end_test(specimen, fast=isinstance(point, Fallen))
-            if isinstance(point, Fallen):
+                point, fallen = yield from self._held_point(_Trial(place, sine, found, under, design), fields, where)
+            yield from end_test(specimen, fast=fallen)
+            if point is None:
                 falls += 1
                 continue
             last = point.model_copy(update={"starts_tried": tried})
@@ -198,26 +198,28 @@ class StabilityPlan:
 
     def _held_point(
         self, trial: _Trial, fields: Mapping[str, Any], where: str
-    ) -> Generator[Step, Outcome, StabilityPoint | Fallen]:
+    ) -> Generator[Step, Outcome, tuple[StabilityPoint | None, bool]]:
+        """Hold the motion, release it, and evaluate it. Returns the point, None if the block fell before the release,
+        and whether it has fallen.
+        """
         p, configuration, sine = self._parameters, self._configuration, trial.sine
         report = self._report(sine)
         settled = yield from settle_and_measure(sine, p, configuration.analysis, report)
         if isinstance(settled, Fallen) or settled.table is None:
-            return Fallen()
+            return None, True
         largest = self._largest(settled)
         yield Publish(StepStarted(f"{where}: holding the motion on its orbit"))
         stabiliser = Stabiliser(trial.design, p.hold_authority)
         run = Hold(sine, settled.table, stabiliser, largest, p, configuration.analysis)
         held = yield from capture_and_measure(run, p.beta, report)
         if isinstance(held, Fallen):
-            return held
+            return None, True
         if held.peak is None:
-            return StabilityPoint.model_validate(
-                {**fields, "status": OrbitStatus.NOT_HELD, "captured_cycles": held.captured, "reason": held.reason}
-            )
+            values = {**fields, "captured_cycles": held.captured, "reason": held.reason}
+            return StabilityPoint.model_validate({**values, "status": OrbitStatus.NOT_HELD}), False
         found = trial.design.cycle_map
         released = yield from release(run, found, settled.table, p.beta, largest, p.released_cycles, p.hold_authority)
-        return released if isinstance(released, Fallen) else self._measured(trial, held, released, fields)
+        return self._measured(trial, held, released, fields), released.fallen
 
     def _largest(self, settled: Settled) -> float:
         """Largest drift allowed during hold and release [m]."""

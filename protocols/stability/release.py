@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from bench.analysis.multiplier import BOUND, Multiplier, dominant_multiplier, linear_part
 from bench.analysis.signals import DRIFT
 from bench.control.stabiliser import BLEND, observed
-from bench.engine.steps import Dwell, Fallen, Measured, Outcome, Publish, SetHarmonics, Step
+from bench.engine.steps import Dwell, Measured, Outcome, Publish, SetHarmonics, Step
 from bench.events import StepStarted
 from protocols.common.sine.holding import Hold, HoldCycle
 from protocols.common.sine.settling import TableState
@@ -34,10 +34,13 @@ LOST = 2.0
 
 @dataclass(frozen=True, eq=False)
 class Released:
-    """Cycles after a release: their coefficients, shape (n, m), and those of the orbit, shape (m,)."""
+    """Cycles after a release: their coefficients, shape (n, m), and those of the orbit, shape (m,). The block may have
+    `fallen` after them.
+    """
 
     series: Array
     orbit: Array
+    fallen: bool = False
 
     @property
     def multiplier(self) -> Multiplier | None:
@@ -57,7 +60,7 @@ def deflection(found: CycleMap, cycles: int, authority: float) -> NDArray[np.com
 
 def release(
     run: Hold, found: CycleMap, table: TableState, beta: float, largest: float, cycles: int, authority: float
-) -> Generator[Step, Outcome, Released | Fallen]:
+) -> Generator[Step, Outcome, Released]:
     """Deflect the motion held by `run` along the dominant pair of the map `found`, release it, and observe up to
     `cycles` cycles without control.
 
@@ -76,7 +79,7 @@ def release(
             yield SetHarmonics((first + control / table.answer, *others), count + 1 + number, BLEND)
         outcome = yield Dwell(1)
         if not isinstance(outcome, Measured):
-            return Fallen()
+            return Released(np.array(rows).reshape(-1, orbit.size), orbit, fallen=True)
         # a control that is set before a cycle takes effect in the following cycle
         played = abs(controls[number - 1]) if 0 < number <= len(controls) else 0.0
         for cycle in outcome.cycles:

@@ -49,14 +49,17 @@ _COLUMNS = (
 )
 
 
-def by_amplitude(points: Sequence[StabilityPoint]) -> bool:
-    """Whether the test varies the amplitude; otherwise it varies the frequency."""
-    return len({point.amplitude_factor for point in points}) > 1
+def by_amplitude(curve: Curve) -> bool:
+    """Whether the test varies the amplitude; otherwise it varies the frequency. `curve` is its prediction, which covers
+    all planned points.
+    """
+    return np.unique(curve["amplitude_factor"]).size > 1
 
 
-def measured_boundaries(points: Sequence[StabilityPoint]) -> list[Boundary]:
-    """Boundaries between the measured points: frequencies [rad/s] or amplitude factors."""
-    over = by_amplitude(points)
+def measured_boundaries(points: Sequence[StabilityPoint], *, over: bool = False) -> list[Boundary]:
+    """Boundaries between the measured points: amplitude factors if the test is `over` amplitude, otherwise frequencies
+    [rad/s].
+    """
     known = [point for point in points if point.modulus is not None]
     return boundaries(
         [point.amplitude_factor if over else point.omega_rad_s for point in known],
@@ -90,9 +93,9 @@ def stability_table(points: Sequence[StabilityPoint], curve: Curve) -> str:
 
 def boundary_texts(points: Sequence[StabilityPoint], curve: Curve) -> list[str]:
     """Statements on the measured and the predicted boundaries."""
-    over = by_amplitude(points)
+    over = by_amplitude(curve)
     unit, name = ("", "amplitude factor") if over else (" rad/s", "frequency")
-    found = measured_boundaries(points)
+    found = measured_boundaries(points, over=over)
     lines = [
         f"boundary of stability: {name} {each.place:.4f} +- {each.uncertainty:.4f}{unit} (k = 2), between the points "
         f"{each.low:.4f} and {each.high:.4f}{unit}"
@@ -112,7 +115,8 @@ def boundary_texts(points: Sequence[StabilityPoint], curve: Curve) -> list[str]:
 
 def laws_texts(points: Sequence[StabilityPoint], curve: Curve) -> list[str]:
     """Statements on the laws of restitution."""
-    return law_texts(points, measured_boundaries(points), curve, "" if by_amplitude(points) else " rad/s")
+    over = by_amplitude(curve)
+    return law_texts(points, measured_boundaries(points, over=over), curve, "" if over else " rad/s")
 
 
 def _cells(point: StabilityPoint) -> list[str]:
@@ -160,7 +164,7 @@ def _draw_moduli(panel: "Axes", points: Sequence[StabilityPoint], curve: Curve) 
     for (law, words), dash in zip(WORDS.items(), ("-", ":", "-."), strict=True):
         if law != HOUSNER and f"{law}_modulus" in curve:
             panel.plot(places, curve[f"{law}_modulus"], color=GREEN, linestyle=dash, linewidth=1.0, label=words)
-    for number, each in enumerate(measured_boundaries(points)):
+    for number, each in enumerate(measured_boundaries(points, over=by_amplitude(curve))):
         panel.axvspan(each.place - each.uncertainty, each.place + each.uncertainty, color=GREY, alpha=0.35, lw=0)
         label = "_" if number else "measured boundary (k = 2)"
         panel.axvline(each.place, color=GREY, linewidth=1.0, label=label)

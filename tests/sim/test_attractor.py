@@ -71,4 +71,5 @@ def test_the_period_is_the_least_number_of_cycles_after_which_all_peaks_return(p
     phases = np.arange(96) * (tau / period)
     both = np.stack((2.0 + np.cos(phases), 3.0 + np.cos(phases + 1.0)), axis=1)
     assert period_of(both) == period
+    assert period_of(both[:1] * (1.0 + 1e-12 * np.random.default_rng(2).standard_normal(both.shape))) == 1
     assert period_of(both + 0.2 * np.random.default_rng(1).standard_normal(both.shape)) == 0

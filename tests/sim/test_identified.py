@@ -111,6 +111,17 @@ def test_nothing_identified_changes_nothing() -> None:
     assert Specimen().coupled(0.4) == Specimen(beta=0.4)
 
 
+def test_a_mounted_spring_keeps_its_stiffness_whatever_its_label() -> None:
+    mounted = Specimen(beta=0.3, spring_label=0.25)
+    assert Identified().applied(mounted) == mounted
+    assert mounted.coupled(0.25) == mounted
+    assert FRAME.applied(mounted).k_c == pytest.approx(0.3 * 213.44)
+    assert FRAME.applied(mounted).label == 0.25
+    assert FRAME.extended([found("k_c:0.25", 50.0, 0.1)]).applied(mounted).k_c == pytest.approx(50.0)
+    # another label is that of another spring
+    assert mounted.coupled(0.4).k_c == pytest.approx(0.4 * 213.44)
+
+
 def test_a_spring_of_any_stiffness_is_called_what_it_amounts_to() -> None:
     drawer = Specimen(frame=Frame(k1=200.0), spring_k1=213.44, springs=(Spring(label=0.5, k_c=99.0),))
     mounted = drawer.with_spring(0.3 * 213.44)

@@ -125,6 +125,13 @@ def test_resting_branch_and_its_edge() -> None:
     assert all(resting_state(Specimen(beta=0.97), omega, A_S) is None for omega in np.linspace(12.0, 21.0, 40))
 
 
+def test_a_resting_motion_leaves_the_spring_a_length() -> None:
+    """|u1| is 42 mm at (18, 0.25)."""
+    assert resting_state(Specimen(beta=0.25, d=0.045), 18.0, A_S) is not None
+    assert resting_state(Specimen(beta=0.25, d=0.04), 18.0, A_S) is None
+    assert resting_state(Specimen(beta=0.0, d=0.005), 19.0, A_S) is not None
+
+
 def test_resting_branch_has_its_own_gain_and_stays_at_rest() -> None:
     prediction = predict_gain(Specimen(beta=0.25), 18.0, A_S)
     assert prediction.resting is not None

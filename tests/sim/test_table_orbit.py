@@ -12,7 +12,7 @@ from sim.kernel.plant import ROCK_A, ROCK_B
 from sim.shaker import Shaker
 from sim.specimen import Specimen
 from sim.steady import Orbit, rocking_orbit
-from sim.table_orbit import SUBSTEPS, TICKS, NoOrbit, TableOrbit, table_orbit
+from sim.table_orbit import SUBSTEPS, TICKS, NoOrbit, TableOrbit, TablePeriod, corner, table_orbit
 
 AMPLITUDE = 1.01 * Specimen().uplift_acceleration
 WINDOW = 130
@@ -67,6 +67,26 @@ def test_an_orbit_that_is_unstable_on_fixed_ground_may_be_stable_on_a_table(mass
     ground = fixed(0.64, 12.5)
     assert not ground.stable
     assert table_orbit(ground, Shaker(moving_mass=mass), harmonics=10).stable is stable
+
+
+def test_a_lag_of_the_amplifier_does_not_change_the_multipliers() -> None:
+    """Between two commands the plant is the same; the commands of a lagging amplifier are only played later."""
+    ground = fixed(0.64, 12.5)
+    prompt, lagging = (table_orbit(ground, Shaker(amplifier_lag=lag), 10) for lag in (0.0, 0.02))
+    assert abs(lagging.slowest - prompt.slowest) < 2e-4
+    assert lagging.drift == pytest.approx(prompt.drift, rel=1e-4)
+
+
+@pytest.mark.parametrize("lag", [0.0, 0.005, 0.02])
+def test_the_orbit_is_a_period_of_the_plant_whose_amplifier_lags(lag: float) -> None:
+    ground, shaker = fixed(0.4, 16.0), Shaker(amplifier_lag=lag)
+    found = table_orbit(ground, shaker)
+    period = TablePeriod(ground.specimen, shaker, ground.omega)
+    y, commands = found.start.copy(), period.commands(found.drive)
+    mode, carried = corner(y), np.array([period.output(commands), 0.0])
+    for _ in range(2):
+        mode, _rows = period.advance(mode, y, carried, commands)
+        np.testing.assert_allclose(y / period.scales(found.start), found.start / period.scales(found.start), atol=1e-7)
 
 
 def test_the_tables_motion_is_a_sine_and_the_gain_that_of_fixed_ground() -> None:

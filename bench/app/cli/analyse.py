@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from bench.app.cli.analyse_settings import Choice, choice_of, listed, unusual_of
+from bench.app.cli.analyse_settings import Choice, choice_of, listed, settings_of, unusual_of
 from bench.app.cli.interrupt import report_interrupt
 from bench.app.cli.options import CampaignFile, Handed, Json
 from bench.app.cli.output import print_result, print_warning, report_error
@@ -100,8 +100,10 @@ def analyse(
     with open_datafile(file) as record:
         choice = choice_of(record, set_, config, specimen)
         if list_:
-            print(listed(choice))
+            print_result(lambda: {"settings": settings_of(choice)}, lambda: listed(choice), as_json=as_json)
             return 0
+        if out is not None:
+            _check_companions(choice, out)
         former = former_keys(record)
         for notice in (*([former] if former else ()), *unusual_of(choice)):
             print_warning(notice)
@@ -118,12 +120,15 @@ def analyse(
             return 130
         kind = choice.protocol.point
         analysis = Analysis(points, kind, choice.given, choice.settings, choice.changed)
-        written = write_analysis(file, record, analysis, out)
+        names = () if result is None else tuple(result.files)
+        written = write_analysis(file, record, analysis, out, companions=lambda path: [_beside(path, n) for n in names])
         kept = _kept(result, written)
         stored = record.points
     new = [point.model_dump(mode="json") for point in points]
     content = {"file": str(written), "settings": choice.given, "recorded": stored, "points": new}
     further = [] if replayed.ended is None else [f"The recording is incomplete: {replayed.ended}"]
+    if len(new) < len(stored):
+        further.append(f"{len(new)} of {len(stored)} recorded results could be computed again")
     further.append(f"Written to {written}")
     if kept is not None:
         content["kept"] = str(kept)
@@ -140,9 +145,23 @@ def _kept(result: "Result | None", written: Path) -> Path | None:
     if result is None:
         return None
     for name, write in result.files.items():
-        path = written.with_name(f"{written.stem}.{name}")
+        path = _beside(written, name)
         write(path)
     return path
+
+
+def _beside(written: Path, name: str) -> Path:
+    """Path of a result file that other runs use, for the analysis file `written`."""
+    return written.with_name(f"{written.stem}.{name}")
+
+
+def _check_companions(choice: Choice, out: Path) -> None:
+    """Raise InvalidInput if a file that is written together with `out` exists."""
+    if choice.follower is None:
+        for path in (_beside(out, name) for name in choice.protocol.files):
+            if path.exists():
+                allowed = f"{path} exists, would be written too, and is never overwritten; choose another name"
+                raise InvalidInput("--out", str(out), allowed)
 
 
 def _carried_out(
@@ -169,7 +188,8 @@ def side_by_side(kind: type[Parameters], stored: Sequence[Mapping[str, Any]], ne
     labels = list(fields)[:2]
     shown = [name for name in HEADLINES if name in fields]
     rows: list[list[str]] = []
-    for before, after in zip(stored, new, strict=True):
+    # the samples of the last results of a recovered file may be lost
+    for before, after in zip(stored, new, strict=False):
         label = ", ".join(_shown(after[name]) for name in labels)
         names = shown or [name for name in fields if before.get(name) != after[name]]
         for name in names:

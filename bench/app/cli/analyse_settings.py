@@ -111,11 +111,11 @@ def unusual_of(choice: Choice) -> tuple[str, ...]:
     return (*new, *notices_of(choice.settings, choice.changed.known_specimen))
 
 
-def listed(choice: Choice) -> str:
-    """Every changeable setting: present value, unit and description."""
+def settings_of(choice: Choice) -> dict[str, dict[str, Any]]:
+    """Every changeable setting by key: present value (`now`), `unit` and `description`."""
     from bench.config.declared import at, keys
 
-    rows: list[tuple[str, str, str, str]] = []
+    found: dict[str, dict[str, Any]] = {}
     groups: list[tuple[str, Parameters]] = [("", choice.settings)]
     groups += [(f"{name}.", getattr(choice.changed, name)) for name in SECTIONS]
     for prefix, group in groups:
@@ -123,13 +123,21 @@ def listed(choice: Choice) -> str:
             path = key.split(".")
             entry = at(type(group), tuple(path))
             if entry is not None and entry.group is None:
-                value = json.dumps(reduce(getattr, path, group), default=str)
-                rows.append((f"{prefix}{key}", value, entry.unit, entry.description))
+                now = json.loads(json.dumps(reduce(getattr, path, group), default=str))
+                found[f"{prefix}{key}"] = {"now": now, "unit": entry.unit, "description": entry.description}
+    return found
+
+
+def listed(choice: Choice) -> str:
+    """Text table of `settings_of`."""
     columns = (
         TextColumn("key", words=True),
         TextColumn("now"),
         TextColumn("unit", words=True),
         TextColumn("meaning", words=True),
+    )
+    rows = (
+        (key, json.dumps(each["now"]), each["unit"], each["description"]) for key, each in settings_of(choice).items()
     )
     return text_table(columns, rows)
 

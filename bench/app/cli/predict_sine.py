@@ -4,6 +4,7 @@ import sys
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
+from math import nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -267,8 +268,10 @@ def extremes(table: "Table") -> str:
             here = np.flatnonzero(chosen & (branch == name))
             if not here.size:
                 continue
-            least, most = here[alpha[here].argmin()], here[alpha[here].argmax()]
             known: list[Any] = [ABSENT if value is None else float(value), name, here.size, int((~stable[here]).sum())]
-            found = [float(x) for k in (least, most) for x in (alpha[k], omega[k], beta[k])]
+            # a run in time that ended early has no gain
+            ended = here[np.isfinite(alpha[here])]
+            limits = (ended[alpha[ended].argmin()], ended[alpha[ended].argmax()]) if ended.size else ()
+            found = [float(x) for k in limits for x in (alpha[k], omega[k], beta[k])] or [nan] * 6
             rows.append([cell(each) for each in (*known, *found)])
     return text_table(columns, rows)

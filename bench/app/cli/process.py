@@ -5,6 +5,7 @@ import os
 import signal
 import sys
 from collections.abc import Callable
+from contextlib import suppress
 from types import FrameType, TracebackType
 from typing import TYPE_CHECKING, Any, Self, TextIO, cast
 
@@ -58,7 +59,7 @@ def _carry_out() -> int:
     from io import TextIOWrapper
 
     from bench.app.cli.main import main
-    from bench.app.cli.output import print_error
+    from bench.app.cli.output import report_error
     from bench.app.cli.streams import lasting
 
     for stream in (sys.stdout, sys.stderr):
@@ -76,7 +77,8 @@ def _carry_out() -> int:
         code = 1
     except OSError as error:
         # for example, standard output is a file on a full disk
-        print_error(error)
+        with suppress(OSError):
+            report_error(error, "system")
         code = 1
     return code
 

@@ -123,7 +123,7 @@ def _run_one(
     test = tests.tests[index]
     interrupted: int | None = None
     out: Path | None = None
-    good, outcome = False, "the program failed"
+    good, goes_on, outcome = False, False, "the program failed"
     try:
         each = checked or ready(test, index + 1, configuration)
         if test.out is not None:
@@ -145,16 +145,21 @@ def _run_one(
                 else f"{ended.status}: {ended.reason}"
             )
             # an interrupt after the end of the plan does not change the ending, but ends the queue
-            if ended.status == "completed" and good and (interrupted is None or tests.next is None):
-                return None
+            goes_on = ended.status == "completed" and good and (interrupted is None or tests.next is None)
     except InvalidInput as refused:
         outcome = f"refused: {refused}"
     except KeyboardInterrupt as interrupt:
         outcome, interrupted = str(interrupt) or "interrupted", 130
     finally:
-        tests.finish(index, good=good, outcome=outcome)
+        try:
+            tests.finish(index, good=good, outcome=outcome)
+        except InvalidInput as error:
+            # the test has run: its outcome is told, and the exit code is not that of a queue that was refused
+            outcome, goes_on = f"{outcome}; but this is not in the queue file: {error}", False
         if out is not None and test.out is None:
             remove_unused(out)
+    if goes_on:
+        return None
     if interrupted is None:
         print_error(f"test {index + 1} {outcome}")
     else:

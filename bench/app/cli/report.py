@@ -53,7 +53,7 @@ def report(
 
     if html is None and pdf is None:
         html = file.with_suffix(".report.html")
-    _check_outputs(html, pdf, overwrite=overwrite)
+    _check_outputs(html, pdf, overwrite=overwrite, source=file)
     with open_datafile(file) as record:
         protocol = installed_protocol(record)
         campaign = Campaign(file, record, None if protocol is None else protocol.parameters)
@@ -140,9 +140,9 @@ def paper(
     return _deliver(document, html, pdf, overwrite=overwrite, progress=progress)
 
 
-def _check_outputs(html: Path | None, pdf: Path | None, *, overwrite: bool) -> None:
-    """Check that the output files can be written and, for PDF, that the typesetter is installed. Raises
-    InvalidInput.
+def _check_outputs(html: Path | None, pdf: Path | None, *, overwrite: bool, source: Path | None = None) -> None:
+    """Check that the output files can be written, that none is the data file `source` and, for PDF, that the typesetter
+    is installed. Raises InvalidInput.
     """
     if pdf is not None:
         require("pdf", "--pdf")
@@ -151,6 +151,8 @@ def _check_outputs(html: Path | None, pdf: Path | None, *, overwrite: bool) -> N
             continue
         if path.is_dir():
             raise InvalidInput(item, str(path), "it is a folder; specify a file in it")
+        if source is not None and path.exists() and source.exists() and path.samefile(source):
+            raise InvalidInput(item, str(path), "it is the data file itself; choose another name")
         if path.exists() and not overwrite:
             raise InvalidInput(item, str(path), "the file exists; choose another name, or use --overwrite")
         if not path.parent.is_dir():

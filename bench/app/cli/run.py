@@ -98,6 +98,7 @@ def _run(
     out = options.out or default_folder(protocol.name, datetime.now())
     check_folder(out, result_names(protocol))
     if options.queue is not None:
+        _check_for_queue(options)
         return _add_to_queue(options.queue, protocol, parameters, configuration, options, progress)
     if options.dry_run:
         from bench.app.cli.dry_run import dry_run
@@ -131,6 +132,17 @@ def _run(
         report_error(ended)
         return interrupted or 1
     return _print_result(ended, out, options.json, interrupted)
+
+
+def _check_for_queue(options: RunOptions) -> None:
+    """Raise InvalidInput for options that a test in a queue cannot have."""
+    if options.dry_run:
+        raise InvalidInput("--dry-run", "--queue", "a dry run adds no test to a queue; use one of the two options")
+    if options.profile is not None:
+        allowed = "a queue runs its tests with the profile of its configuration: set the keys of the profile there"
+        raise InvalidInput("--profile", options.profile, allowed)
+    if options.yes and options.ask:
+        raise InvalidInput("--yes", "--ask", "the two options contradict each other; use one of them")
 
 
 def _add_to_queue(
@@ -167,7 +179,12 @@ def _add_to_queue(
                 unattended=options.yes,
             )
         )
-    print(f"added as test {len(queue.tests)} of {path}")
+    number = len(queue.tests)
+    print_result(
+        lambda: {"queue": str(path), "test": number},
+        lambda: f"added as test {number} of {path}",
+        as_json=options.json,
+    )
     return 0
 
 

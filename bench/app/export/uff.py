@@ -100,9 +100,6 @@ def _dataset(
     exact = (
         f"first sample {round(time[0] * content.sample_rate)} of the run, {content.sample_rate!r} samples per second"
     )
-    if signal.conversion is not None:
-        how = signal.conversion
-        exact = f"value = counts * {how['scale']!r} + {how['offset']!r} in {how['value_unit']}; {exact}"
     lines = (
         signal.name,
         f"run {run.number} of {info['file']}",

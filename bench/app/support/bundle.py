@@ -4,14 +4,17 @@ import io
 import json
 import re
 import zipfile
-from collections.abc import Callable
-from pathlib import Path
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from pathlib import Path, PurePosixPath, PureWindowsPath
+from typing import Any, cast
 
 import numpy as np
 
 from bench.datafile.inspection import overview
 from bench.datafile.reader import DataFile, open_datafile
 from bench.datafile.writer import journal_path
+from bench.events import OperatorNote
 from bench.inert import shown
 from bench.provenance import software
 from bench.results import SUMMARY
@@ -19,8 +22,8 @@ from bench.unfinished import write_new
 
 LAST = 60.0
 """Duration of the data taken from the end of the file [s]."""
-PERSONAL = ("operator", "notes", "file", "journal")
-"""Keys whose values may contain names of people or paths."""
+PERSONAL = frozenset({"operator", "notes", "file", "journal", "by"})
+"""Keys whose values contain names of people or paths."""
 REMOVED = "(removed)"
 _PATH = re.compile(r"(?:[A-Za-z]:\\|\\\\|/)[^\s\"',;:*?<>|]+")
 
@@ -54,10 +57,39 @@ def write_bundle(path: Path, target: Path, *, anonymous: bool) -> tuple[str, ...
     return tuple(texts)
 
 
-def anonymised(text: str, names: tuple[str, ...]) -> str:
-    """The text without `names`, paths and the values of PERSONAL keys."""
-    for key in PERSONAL:
-        text = re.sub(rf'("{key}":\s*)"(?:[^"\\]|\\.)*"', rf'\1"{REMOVED}"', text)
+def anonymised(text: str, names: Sequence[str]) -> str:
+    """The text without `names`, paths, notes and values of PERSONAL keys. JSON, and lines of JSON, remain valid."""
+    try:
+        return json.dumps(_without(json.loads(text), names), indent=1, ensure_ascii=False) + "\n"
+    except ValueError:
+        return "".join(_anonymised_line(line, names) for line in text.splitlines(keepends=True))
+
+
+def _anonymised_line(line: str, names: Sequence[str]) -> str:
+    if line.startswith("{"):
+        with suppress(ValueError):
+            return json.dumps(_without(json.loads(line), names), ensure_ascii=False) + "\n"
+    return _plain(line, names)
+
+
+def _without(content: Any, names: Sequence[str]) -> Any:
+    """A value of JSON without personal data."""
+    if isinstance(content, dict):
+        members = cast(dict[str, Any], content)
+        hidden = PERSONAL | ({"text", "columns"} if members.get("kind") == OperatorNote.__name__ else frozenset())
+        return {
+            key: REMOVED if key in hidden and value not in (None, "") else _without(value, names)
+            for key, value in members.items()
+        }
+    if isinstance(content, list):
+        return [_without(each, names) for each in cast(list[Any], content)]
+    if isinstance(content, str):
+        absolute = PurePosixPath(content).is_absolute() or PureWindowsPath(content).is_absolute()
+        return REMOVED if absolute else _plain(content, names)
+    return content
+
+
+def _plain(text: str, names: Sequence[str]) -> str:
     for name in names:
         text = text.replace(name, REMOVED)
     return _PATH.sub(lambda found: found[0] if found[0].count("/") < 2 and "\\" not in found[0] else REMOVED, text)
@@ -81,13 +113,18 @@ def _metadata(path: Path, name: str) -> str:
 
 
 def _personal_names(path: Path) -> tuple[str, ...]:
+    """Home folder, operator and notes of the run, and all who answered or wrote a note during it."""
     names = [str(Path.home())]
+    with suppress(OSError):
+        for line in journal_path(path).read_text(encoding="utf-8", errors="replace").splitlines():
+            with suppress(ValueError, AttributeError, LookupError, TypeError):
+                names += [by] if isinstance(by := json.loads(line)["columns"].get("by"), str) and len(by) > 1 else []
     try:
         with open_datafile(path) as record:
             names += [text for key in ("operator", "notes") if len(text := record.metadata.get(key, "")) > 1]
     except Exception:
-        return tuple(names)
-    return tuple(names)
+        return tuple(dict.fromkeys(names))
+    return tuple(dict.fromkeys(names))
 
 
 def _last_data(path: Path) -> str:

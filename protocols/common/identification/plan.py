@@ -21,6 +21,7 @@ from bench.engine.steps import Arm, Fallen, OperatorAction, Outcome, Play, Playe
 from bench.events import Event, Progress, StepStarted, Warned
 from bench.findings import TableIdentified
 from bench.guard.limits import Limits
+from bench.guard.quantities import filled
 from bench.preflight.motion import RESTING, resting_demands
 from drivers.rig import OperatorTask
 from protocols.common.calibrate import PROBE, Unmeasurable
@@ -215,7 +216,7 @@ def identified(
         yield Publish(StepStarted(f"multisine {number} of {parameters.realisations}, {found.grid.duration:.0f} s"))
         volts = found.grid.record(drive_for(motion, response, found.grid, rules.knee))
         rules.require_drive(volts)
-        outcome = yield from _complete(volts, rules, f"multisine {number}")
+        outcome = yield from _complete(volts, rules, found.grid, f"multisine {number}")
         if isinstance(outcome, Fallen):
             raise (yield from _fell(specimen))
         yield from _warned(outcome, specimen, configuration)
@@ -227,16 +228,16 @@ def identified(
     return model
 
 
-def _complete(volts: Array, rules: Rules, name: str) -> Generator[Step, Outcome, Played | Fallen]:
-    """Play a multisine without missing samples of the table's motion; it is repeated once. Raises Unmeasurable if they
-    are missing again.
+def _complete(volts: Array, rules: Rules, grid: Grid, name: str) -> Generator[Step, Outcome, Played | Fallen]:
+    """Play a multisine without missing samples of the table's motion in the periods that are used; it is repeated once.
+    Raises Unmeasurable if they are missing again.
     """
     for again in (False, True):
         outcome = yield from played(volts, rules)
         if isinstance(outcome, Fallen):
             return outcome
         moved = outcome.signals[:, [ACCELERATION, DISPLACEMENT]]
-        lost = int(np.count_nonzero(~np.isfinite(moved).all(axis=1)))
+        lost = int(np.count_nonzero(~np.isfinite(grid.used_rows(moved)).all(axis=1)))
         if not lost:
             return outcome
         if not again:
@@ -270,7 +271,8 @@ def _fell(specimen: Specimen) -> Generator[Step, Outcome, Unmeasurable]:
 
 def _warned(outcome: Played, specimen: Specimen, configuration: BenchConfiguration) -> Generator[Step, Outcome, None]:
     """Warn if the measured motion may have lifted the block, since a rocking block changes the system."""
-    moved = outcome.signals[:, ACCELERATION]
+    # samples outside the used periods may be missing
+    moved = filled(outcome.signals[:, ACCELERATION])
     share = resting_demands(moved, configuration.sample_rate, specimen, configuration).get(RESTING, 0.0)
     if share > 1.0:
         text = (

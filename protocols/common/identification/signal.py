@@ -71,6 +71,12 @@ class Grid:
         rise = 0.5 * (1.0 - np.cos(np.pi * np.arange(n) / n))
         return np.concatenate((rise * one[self.samples - n :], whole, rise[::-1] * one[:n]))
 
+    def used_rows(self, values: Array) -> Array:
+        """The rows of `values`, shape (n, ...), measured while the drive was played, from the first used period on and
+        without the fade-out.
+        """
+        return values[self.fade + self.discarded * self.samples : len(values) - self.fade]
+
     def used(self, record: Array) -> Array:
         """Steady-state periods of `record`, a signal measured while the drive was played, shape (periods, samples).
 

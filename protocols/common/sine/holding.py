@@ -136,7 +136,8 @@ def hold(
     yield SetHarmonics(kicked, run.monitor.cycles + 1, BLEND)
     yield SetHarmonics(run.shares, run.monitor.cycles + 2, BLEND)
     free = yield from _released(sine, beta, held.peak.drift, largest, run.monitor.cycles)
-    return free if isinstance(free, Fallen) else replace(held, rate=free)
+    # a fall after the release does not concern what was measured before it
+    return replace(held, fallen=True) if isinstance(free, Fallen) else replace(held, rate=free)
 
 
 def capture_and_measure(run: "Hold", beta: float, report: Report) -> Generator[Step, Outcome, Held | Fallen]:

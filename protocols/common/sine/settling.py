@@ -66,8 +66,8 @@ class Held:
 
     `control` is the rms of the control over the measured cycles, as a share of the amplitude, and `captured` the number
     of cycles until the capture. `peak` is None if the hold was released, for the stated `reason`. `rate` is the rate of
-    change of the deviation without control, after the measurement. `model_free` tells whether the stabiliser's map was
-    identified in the run.
+    change of the deviation without control, after the measurement, during which the block may have `fallen`.
+    `model_free` tells whether the stabiliser's map was identified in the run.
     """
 
     peak: SteadyPeak | None
@@ -79,6 +79,7 @@ class Held:
     captured: int | None = None
     cycles: int = 0
     rate: Rate | None = None
+    fallen: bool = False
     model_free: bool = False
 
 

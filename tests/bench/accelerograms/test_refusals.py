@@ -246,6 +246,16 @@ def test_what_columns_need(refuse: Refuse) -> None:
     assert "too few digits" in refuse([f"{0.004 * k:.2f},{k % 3 - 1.0}" for k in range(12)], unit="g")
     assert "must be one of" in refuse(COLUMNS, unit="furlong")
     assert "positive" in refuse(["0.1", "-0.2"], unit="g", dt=-1.0)
+    assert "it states dt = 5 ms" in refuse(["% dt = 5 ms", "0.1", "-0.2"], unit="g", dt=0.01)
+    for comment in ("# t [s], a [g]", "% acceleration in gal", "% acceleration in g"):
+        assert "it states g" in refuse([comment, "0.1", "-0.2"], unit="m/s2", dt=0.01)
+
+
+@pytest.mark.parametrize("step", [5.0, 1.0])
+def test_a_step_that_no_record_has(refuse: Refuse, step: float) -> None:
+    """Times in milliseconds, or an index."""
+    message = refuse([f"{step * k:g},{0.1 * (k % 5)}" for k in range(9)], unit="g")
+    assert "is its time in ms, or an index?" in message
 
 
 def test_files_that_are_no_records(refuse: Refuse, tmp_path: Path) -> None:

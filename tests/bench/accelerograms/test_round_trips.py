@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from bench.accelerograms.accelerogram import Accelerogram
 from bench.accelerograms.read import read_accelerogram
+from sim.errors import InvalidInput
 from tests.bench.accelerograms import writers
 from tests.bench.accelerograms.writers import Block
 
@@ -162,6 +163,23 @@ def test_cosmos_one_to_a_line(back: Callable) -> None:
     same(back(writers.cosmos({"Up": block}, "0.02", "(1E15.6)")), block, 0.01, "0.02")
 
 
+def test_cosmos_that_was_resampled_has_the_step_of_its_samples(back: Callable) -> None:
+    block = Block([f"{value:15.6E}" for value in np.sin(np.arange(1200) / 30.0)], 1)
+    lines = writers.cosmos({"Up": block}, "0.005", "(1E15.6)", recorder="0.010000")
+    assert back(lines).dt == 0.005
+    # a header whose step contradicts the stated duration
+    with pytest.raises(InvalidInput, match=r"it states 6 s, but with the step of the header, 0.01 s"):
+        back([line.replace("5.000000", "10.00000") for line in lines])
+
+
+@pytest.mark.parametrize("form", ["{:.18e}", "{:.16f}", "{!r}"])
+def test_times_with_all_their_digits(back: Callable, form: str) -> None:
+    motion = np.sin(np.arange(4172) / 17.0)
+    for time in (0.01 * np.arange(4172), 0.01 * np.arange(1, 4173)):
+        lines = ["t [s],a [g]", *(f"{form.format(float(t))},{a:.7f}" for t, a in zip(time, motion, strict=True))]
+        assert back(lines).dt == 0.01
+
+
 @quick
 @given(
     st.integers(1, 4),
@@ -241,3 +259,28 @@ def test_the_hash_is_that_of_the_bytes(back: Callable) -> None:
     # sha256sum of "0.5\n-0.25\n", by coreutils
     found = back(["0.5", "-0.25"], dt=0.01, unit="g").sha256
     assert found == "3272aa2dc7656a1f549dfdbbbe600b22b2f73911994a8481b2f5644a13626eec"
+
+
+@pytest.mark.parametrize("heading", ["a [m/s\u00b2]", "a [m/s\u00c2\u00b2]", "a [cm/s\u00b2]"])
+def test_a_superscript_two_in_both_encodings(back: Callable, heading: str) -> None:
+    record = back([f"t [s],{heading}", "0.00,0.1", "0.01,0.2", "0.02,-0.3"])
+    assert record.unit == heading[3 : heading.index("/")] + "/s2"
+
+
+def test_a_remark_in_brackets_is_no_unit(back: Callable) -> None:
+    lines = ["t [s],NS (filtered)", "0.00,0.1", "0.01,0.2", "0.02,-0.3"]
+    assert back(lines, unit="g").unit == "g"
+    with pytest.raises(InvalidInput, match="not a known unit of acceleration"):
+        back(lines)
+
+
+@pytest.mark.parametrize(
+    ("comment", "options"),
+    [
+        ("% dt = 5 ms", {"dt": 0.005, "unit": "g"}),
+        ("% dt = 1/200 s", {"dt": 0.005, "unit": "g"}),
+        ("% converted from cm/s2 to m/s2", {"dt": 0.005, "unit": "m/s2"}),
+    ],
+)
+def test_comments_that_agree(back: Callable, comment: str, options: dict[str, object]) -> None:
+    assert back([comment, "0.1", "0.2", "-0.3"], **options).dt == 0.005

@@ -138,12 +138,17 @@ def csmip(blocks: dict[str, Block], dt: str, stated: str = "", upper: bool = Tru
     return [line.upper() for line in lines] if upper else lines
 
 
-def cosmos(blocks: dict[str, Block], dt: str, stated: str, unit: str = "cm/sec2(04)") -> list[str]:
-    """Channels by their names, numbered from 1, each followed by a velocity."""
+def cosmos(
+    blocks: dict[str, Block], dt: str, stated: str, unit: str = "cm/sec2(04)", recorder: str | None = None
+) -> list[str]:
+    """Channels by their names, numbered from 1, each followed by a velocity; the recorder's step is `dt` by default."""
     lines: list[str] = []
     for number, (name, block) in enumerate(blocks.items(), 1):
+        lasts = round(len(block.fields) * float(dt))
         reals = ["-999.000000"] * 100
-        reals[33] = dt
+        # that of the recorder, and that of the samples [ms]
+        reals[33] = dt if recorder is None else recorder
+        reals[61] = "-999.000000" if recorder is None else f"{1e3 * float(dt):.6f}"
         for what, its_unit, part in (
             ("acceleration", unit, block),
             ("velocity", "cm/sec(05)", Block(["   0.00000"] * 9, 8)),
@@ -160,7 +165,7 @@ def cosmos(blocks: dict[str, Block], dt: str, stated: str, unit: str = "cm/sec2(
                 *("".join(real.rjust(15) for real in reals[k : k + 5]) for k in range(0, 100, 5)),
                 '   1 Comment line(s) follow, each starting with a "|":',
                 "| 12 acceleration pts, of a comment",
-                f"   {len(part.fields)} {what} pts, approx   1 secs, units={its_unit},Format={form}",
+                f"   {len(part.fields)} {what} pts, approx {lasts:3d} secs, units={its_unit},Format={form}",
                 *part.rows,
                 f"End-of-data for Chan  {number} {what}",
             ]

@@ -1,7 +1,6 @@
 """Frames from decays: against motions that scipy made, with lasers that scale, lag and bend; and how sure it is."""
 
 from dataclasses import replace
-from datetime import UTC, datetime
 from math import pi
 
 import numpy as np
@@ -15,9 +14,9 @@ from bench.analysis.free_decay.decay import Setting, combine, pulsed_decay, rele
 from bench.analysis.free_decay.fit import fit_from_scratch
 from bench.analysis.free_decay.response import K1, K2, OMEGA1, XI1, XI2, Constants, quantities, response
 from bench.analysis.free_decay.stretch import Unusable, stretch_of
-from bench.analysis.laser_calibration import LaserCalibration, LaserCurve
 from bench.analysis.sensor_accuracy import SensorAccuracy, SensorUncertainty
 from sim.specimen import Frame
+from tests.bench.calibrated import calibration
 
 Array = NDArray[np.float64]
 
@@ -256,17 +255,8 @@ def test_a_frame_that_is_touched_after_its_release_is_no_free_decay() -> None:
 
 
 def test_the_linearity_of_a_calibrated_laser_is_that_of_its_calibration() -> None:
-    curve = LaserCurve(
-        sensor="ILD1420", lowest=-0.03, highest=0.05, rest=0.01, error=(0.0, 1e-4), uncertainty=1e-5, scale=1.0,
-        delay=0.0, delay_uncertainty=0.0,
-    )  # fmt: skip
-    calibration = LaserCalibration(
-        date=datetime(2026, 1, 1, tzinfo=UTC), valid_days=90.0, laser_1=curve, laser_2=curve, differential_scale=1.0,
-        differential_uncertainty=1e-4, common_linearity=3e-5, table_displacement=1.0, table_acceleration=1.0,
-        table_uncertainty=1e-3,
-    )  # fmt: skip
     accuracy = SensorAccuracy(laser_linearity=8e-4)
-    calibrated = SensorUncertainty(accuracy, (0.2, 0.2), calibration)
+    calibrated = SensorUncertainty(accuracy, (0.2, 0.2), calibration(-0.03, 0.05, rest=0.01))
     for laser in range(2):
         inside, outside = np.array([-0.04, np.nan, 0.04]), np.array([0.0, 0.041])
         assert calibrated.linearity_amplitude(laser, inside) == pytest.approx(np.hypot(np.sqrt(2.0) * 1e-5, 3e-5))

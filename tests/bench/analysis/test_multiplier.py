@@ -166,6 +166,10 @@ def test_noise_alone_has_no_multiplier() -> None:
 def test_a_series_that_is_short_constant_or_not_finite() -> None:
     series = spiral(np.exp(2.8j), SHORTEST - 1, 0.1, 0.0, 1)
     assert dominant_multiplier(series) is None
+    # too short to be compared with its part without the first cycles
+    for n in range(SHORTEST, SHORTEST + 3):
+        assert dominant_multiplier(spiral(np.exp(2.8j), n, 0.1, 1e-4, 1)) is None
+    assert dominant_multiplier(spiral(np.exp(2.8j), SHORTEST + 3, 0.1, 1e-4, 1)) is not None
     assert dominant_multiplier(np.ones((40, 12))) is None
     with pytest.raises(ValueError, match="not finite"):
         dominant_multiplier(np.full((40, 12), np.nan))

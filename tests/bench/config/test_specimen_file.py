@@ -1,5 +1,6 @@
 """The specimen file: written, read, refused, and what a configuration makes of it."""
 
+import errno
 import json
 from collections.abc import Callable
 from datetime import UTC, datetime
@@ -13,7 +14,7 @@ from bench.config.model import BenchConfiguration
 from bench.config.result_files import read_specimen, write_specimen
 from bench.config.template import as_toml
 from bench.config.toml import problems_of, read_configuration
-from sim.errors import InvalidInput
+from sim.errors import InvalidInput, RockbenchError
 from sim.identified import Correlation, Finding, Identified
 from sim.specimen import Specimen
 
@@ -48,7 +49,7 @@ def test_a_file_is_never_overwritten(kept: Path) -> None:
     with pytest.raises(InvalidInput, match="never overwritten"):
         write_specimen(kept, Identified())
     assert kept.read_bytes() == before
-    with pytest.raises(InvalidInput, match="cannot be written"):
+    with pytest.raises(InvalidInput, match="the folder does not exist"):
         write_specimen(kept / "inside.json", Identified())
 
 
@@ -155,3 +156,14 @@ def test_predictions_take_it_and_flags_win_over_it(kept: Path, capsys: pytest.Ca
     other = predicted("--specimen", str(kept), "--restitution-factor", "0.98")
     assert other["specimen"]["block"]["restitution_factor"] == 0.98
     assert [finding["name"] for finding in other["known"]["identified"]["findings"]] == ["k1", "k_c:0.25"]
+
+
+def test_a_file_on_a_full_disk_is_no_file_and_no_refusal(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object, **__: object) -> int:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_text", full)
+    with pytest.raises(RockbenchError, match=r"could not be written \(No space left on device\): check") as caught:
+        write_specimen(tmp_path / "specimen.json", IDENTIFIED)
+    assert not isinstance(caught.value, InvalidInput)
+    assert list(tmp_path.iterdir()) == []

@@ -117,6 +117,13 @@ def test_a_single_cycle_with_another_response_is_borne() -> None:
         assert _quiet(monitor, 3) is None
 
 
+def test_a_control_that_is_limited_captures_nothing() -> None:
+    monitor = HoldMonitor(15.0, 0.01, patience=200, largest=0.02, answer=0.9 + 0.1j)
+    assert _quiet(monitor, 199, control=0.01) is None
+    assert monitor.captured_after is None
+    assert "not captured within 200 cycles" in (_quiet(monitor, 1, control=0.01) or "")
+
+
 def test_other_reasons_to_release() -> None:
     assert "21 mm, but only 20 mm is allowed" in (_monitor().push(0.0, 0.021, 1.0, 0.9 + 0.1j) or "")
     assert "not captured within 200 cycles" in (_quiet(_monitor(), 200, control=0.08) or "")

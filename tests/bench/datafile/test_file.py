@@ -1,5 +1,6 @@
 """`rockbench file`: what is said about whole, unfinished, old, foreign and damaged files, and what is made of them."""
 
+import errno
 import hashlib
 import json
 from collections.abc import Callable
@@ -45,7 +46,15 @@ def edited(path: Path, change: Callable[[Any], None]) -> None:
 
 
 def as_format_1(file: Any) -> None:
-    """What the previous layout had not: a time axis, checksums, the later tables."""
+    """What the previous layout had not: a time axis, checksums, the later tables; it had LZF in place of gzip."""
+    for name in (*(f"{channel.name}/counts" for channel in CHANNELS), "drive/voltage"):
+        stored = file["entry/instrument"][name]
+        values, attributes, chunks = stored[()], dict(stored.attrs), stored.chunks
+        del file["entry/instrument"][name]
+        made = file["entry/instrument"].create_dataset(
+            name, data=values, maxshape=(None,), chunks=chunks, compression="lzf", shuffle=True
+        )
+        made.attrs.update(attributes)
     for name in ("checksums", "data", "running_gains", "table_response", "user", "notes"):
         del file["entry"][name]
     counted = file["entry/complete"][:6]
@@ -356,3 +365,15 @@ def test_an_object_that_cannot_be_read_is_named(path: Path, capsys: pytest.Captu
     with bench.datafile.open(path.with_name("campaign-recovered.h5")) as record:
         assert (record.rows, record.events, record.status) == (ROWS, [], "interrupted")
         assert "/entry/events/kind cannot be read" in record.summary
+
+
+def test_a_file_that_may_not_be_read_is_refused_by_verify_too(
+    path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def denied(_: Path) -> bool:
+        raise PermissionError(errno.EACCES, "Permission denied")
+
+    monkeypatch.setattr("bench.datafile.opening.is_let_go", denied)
+    for command in ("info", "verify"):
+        assert main(["file", command, str(path), "--json"]) == 2
+        assert "cannot be opened (Permission denied)" in json.loads(capsys.readouterr().out)["error"]["message"]

@@ -1,5 +1,6 @@
 """Raw values of sensors with their own clocks: recorded, read, recovered, and resampled again."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import h5py  # pyright: ignore[reportMissingTypeStubs]
@@ -119,3 +120,21 @@ def test_chunks_kept_in_memory_are_few(tmp_path: Path) -> None:
     kept = [each._stored.id.get_access_plist().get_chunk_cache()[1] for each in recorder._writer._parts.grown]  # pyright: ignore
     recorder.close("completed")
     assert sum(kept) < 30e6
+
+
+def test_a_lost_channel_does_not_rename_the_sensors_after_it(tmp_path: Path) -> None:
+    path, target = tmp_path / "campaign.h5", tmp_path / "again.h5"
+    table = Channel("table_displacement", "displacement", "m", 1e-6, 0.0, (-32000, 32000), "made")
+    lasers = [replace(LASER, name=name) for name in ("laser_1", "laser_2")]
+    sent = {
+        name: RawValues(name, *(np.arange(9) + k for _ in range(4))) for k, name in ((10, "laser_1"), (50, "laser_2"))
+    }
+    events = [Acquired(1, Block(0, np.zeros((100, 3), dtype=np.int16)), np.zeros(100), time=0.1)]
+    record(begin(path, channels=[table, *lasers]), *events, ValuesReceived(1, tuple(sent.values())))
+    with h5py.File(path, "r+") as file:
+        del file["entry/instrument/table_displacement/counts"].attrs["scale"]
+    recover(path, target)
+    with open_datafile(target) as kept:
+        assert [channel.name for channel in kept.channels] == ["laser_1", "laser_2"]
+        for name, raw in sent.items():
+            np.testing.assert_array_equal(kept.raw_values(name, 1).index, raw.index)

@@ -13,6 +13,7 @@ from bench.guard.sensors import TimeWatch
 from bench.guard.shaker import ShakerModel
 from bench.testing.loopback import LoopbackRig
 from drivers.errors import RigError
+from drivers.rig import Block
 from sim.errors import InvalidInput
 
 N = 100
@@ -314,6 +315,34 @@ def test_the_coil_is_still_warm_when_the_rig_is_armed_again(pause: float) -> Non
     # whole seconds of the pause count; the block itself cools the coil further, by at most N samples
     cooled = heat * np.exp(-np.floor(pause) / 2.0)
     assert cooled * np.exp(-N / rig.sample_rate / 2.0) * (1.0 - 1e-9) <= found**2 <= cooled * (1.0 + 1e-9)
+
+
+class Late(LoopbackRig):
+    """Later blocks than the first few are read `late` [s] after their last sample."""
+
+    late = 0.0
+
+    def read(self, n: int) -> Block:
+        block = super().read(n)
+        if block.first > 10 * N:
+            self.clock.wait_until(self.clock.now() + self.late)
+        return block
+
+
+def test_a_late_block_does_not_change_how_long_the_coil_cooled() -> None:
+    """A replay knows the time of the first block of a run, and counts samples from there."""
+    heats: list[float] = []
+    for late in (0.0, 0.03):
+        rig = Late({"table_displacement": _nothing, "table_acceleration": lambda v: v})
+        limits = Limits(acceleration=10.0, heating=9.0, heating_time=2.0)
+        guard = Guard(rig, limits, RAMPS, ShakerModel(20.0, 0.0, 20.0))
+        rig.late = late
+        _warmed(rig, guard)
+        # a little more than three seconds after the last sample, less after the last block was read
+        rig.clock.wait_until(rig.played.size / rig.sample_rate + 3.01)
+        guard.arm()
+        heats.append(guard.exchange(np.zeros(N)).magnitudes()["heating"])
+    assert heats[0] == heats[1]
 
 
 @pytest.mark.parametrize(

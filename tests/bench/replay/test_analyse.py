@@ -222,3 +222,32 @@ def test_another_protocol_is_carried_out_again_unless_it_would_have_driven_other
     assert main(["analyse", file, "--set", "velocity=0.05"]) == 2
     assert "change the drive of the table (the drive first differs at sample" in capsys.readouterr().err
     assert not (tmp_path / "campaign.analysis-2.h5").exists()
+
+
+def test_settings_that_need_more_than_was_recorded_are_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["run", "free-vibration", "--repeats", "1", "--yes", "--out", str(tmp_path / "run")]) == 0
+    file = tmp_path / "run" / "campaign.h5"
+    capsys.readouterr()
+    assert main(["analyse", str(file), "--set", "repeats=2", "--json"]) == 2
+    assert "need more than was recorded (no recorded run remains" in capsys.readouterr().err
+    assert not [*file.parent.glob("*.analysis-*")]
+    # a result file for other runs is written beside the analysis, and overwritten as little
+    taken = tmp_path / "again.specimen.json"
+    taken.write_text("mine")
+    assert main(["analyse", str(file), "--out", str(tmp_path / "again.h5")]) == 2
+    assert "again.specimen.json exists" in capsys.readouterr().err
+    assert not (tmp_path / "again.h5").exists()
+    beside = file.with_name("campaign.analysis-1.specimen.json")
+    beside.write_text("mine")
+    assert main(["analyse", str(file), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["file"].endswith("campaign.analysis-2.h5")
+    assert beside.read_text() == "mine"
+
+
+def test_the_list_of_settings_is_one_object_too(campaign: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["analyse", str(campaign), "--list", "--json"]) == 0
+    settings = json.loads(capsys.readouterr().out)["settings"]
+    assert settings["specimen.frame.k2"]["now"] == 56.45
+    assert settings["specimen.frame.k2"]["unit"] == "N/m"

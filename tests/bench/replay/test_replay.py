@@ -499,3 +499,26 @@ def test_what_cannot_be_played_is_refused_in_a_line(path: Path, capsys: pytest.C
     for speed in ("0", "fast", "-1", "nan"):
         assert main(["replay", str(path), f"--speed={speed}"]) == 2
         assert "--speed" in capsys.readouterr().err
+
+
+def test_an_arming_that_was_refused_ends_no_run_before_it(tmp_path: Path) -> None:
+    rig = loopback()
+
+    class Presses:
+        """Presses the emergency stop while putting the block back, and confirms."""
+
+        name, asked = "somebody (at the bench)", 0
+
+        def confirm(self, request: str) -> bool:  # noqa: ARG002
+            self.asked += 1
+            if self.asked == 2:
+                rig.safety = {"emergency stop": False}
+            return True
+
+    ending = recorded(tmp_path / "run.h5", Two().plan(BENCH), rig, BENCH, Found, operator=Presses())
+    assert "arming is refused: emergency stop open" in ending.reason
+    replayed = played(tmp_path / "run.h5")
+    assert replayed.found.differences == []
+    assert len(replayed.points) == 1
+    assert replayed.ended is not None
+    assert "no recorded run remains" in replayed.ended

@@ -1,5 +1,6 @@
 """Parts of the live twin against closed forms and against `scipy`."""
 
+from dataclasses import replace
 from math import nan, tau
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from bench.analysis.sensor_accuracy import SensorAccuracy, SensorUncertainty
 from bench.analysis.signals import SignalMap
 from bench.config.model import BenchConfiguration
 from bench.config.sections import Simulation
@@ -19,7 +21,9 @@ from sim.linear import steady_peaks
 from sim.rocking import simulate
 from sim.specimen import Specimen
 from sim.virtual_bench import VirtualBenchParameters
+from tests.bench.calibrated import calibration
 
+SENSORS = SensorUncertainty(SensorAccuracy(laser_linearity=5e-4), (0.2, 0.2))
 COUPLED = Specimen().coupled(0.25)
 
 
@@ -105,7 +109,7 @@ def test_without_the_acceleration_of_the_table_there_is_no_model_and_without_a_l
     rig = LoopbackRig()
     names = [channel.name for channel in rig.channels]
     signals = SignalMap(rig.channels, "ground")
-    setting = Setting(rig.sample_rate, True, (0.0, 0.0), (1e-4, 1e-4))
+    setting = Setting(rig.sample_rate, True, (0.0, 0.0), SENSORS)
     values = np.zeros((1500, 4))
     values[:, names.index("laser_2")] = np.nan
     estimator = Estimator(1, setting, Members([COUPLED], np.ones(1)))
@@ -186,3 +190,19 @@ def test_the_lag_of_the_lasers_is_what_their_settings_say(
     configuration: BenchConfiguration, expected: tuple[float, float]
 ) -> None:
     assert laser_lag(configuration) == pytest.approx(expected)
+
+
+def test_the_band_has_the_calibrated_errors_only_where_the_lasers_are_calibrated() -> None:
+    rig = LoopbackRig()
+    names = [channel.name for channel in rig.channels]
+    for reading, amplitude in ((0.005, np.hypot(np.sqrt(2.0) * 1e-5, 3e-5)), (0.02, 1e-4)):
+        signals = SignalMap(rig.channels, "ground")
+        sensors = replace(SENSORS, calibration=calibration(-0.01, 0.01))
+        estimator = Estimator(1, Setting(rig.sample_rate, True, (0.0, 0.0), sensors), Members([COUPLED], np.ones(1)))
+        values = np.zeros((1500, 4))
+        signals.tare(values)
+        values[:, names.index("laser_1")] = values[:, names.index("laser_2")] = reading
+        found = estimator.take(0.0, 1500, signals.of(values), None)
+        assert found is not None
+        # a single member, so that the band is the errors of the lasers alone
+        assert found.drift_high - found.drift_low == pytest.approx(2.0 * np.sqrt(2.0) * amplitude, rel=1e-6)

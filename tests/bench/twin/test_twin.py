@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from bench.analysis.sensor_accuracy import SensorAccuracy, SensorUncertainty
 from bench.config.sections import Twin
 from bench.datafile.reader import open_datafile
 from bench.engine.steps import OperatorAction, Plan
@@ -32,6 +33,7 @@ from tests.recorded import recorded
 
 Array = NDArray[np.float64]
 
+SENSORS = SensorUncertainty(SensorAccuracy(laser_linearity=5e-4), (0.2, 0.2))
 STAND_UP = OperatorAction(OperatorTask.STAND_BLOCK_UP, COUPLED, "stand the block up")
 
 
@@ -103,7 +105,7 @@ def test_how_the_samples_are_cut_into_blocks_changes_no_motion() -> None:
     bench = Beside(configuration(enabled=False))
     bench.run(shaken(3.0))
     signals = np.concatenate([event.signals for event in bench.events if isinstance(event, Acquired)])
-    setting = Setting(RATE, True, (1e-4, 6e-4), (1e-4, 1e-4))
+    setting = Setting(RATE, True, (1e-4, 6e-4), SENSORS)
     ends: list[TwinEstimate] = []
     traces: list[Array] = []
     for size in (7, 37, 500):

@@ -212,6 +212,16 @@ def test_a_model_with_too_narrow_a_band_is_refused(
         stored_table(ONE, stored(**narrow))
 
 
+def test_a_model_that_covers_the_band_exactly_is_accepted(stored: Callable[..., BenchConfiguration]) -> None:
+    """The lowest line is a multiple of the resolution, 7 times 0.1 Hz, which is 0.7000000000000001."""
+    lines = tuple((np.arange(7, 801) * 0.1).tolist())
+    assert lines[0] > 0.7
+    names = ("real", "imaginary", "uncertainty", "distortion", "coherence", "noise")
+    ones = dict.fromkeys(names, (1.0,) * len(lines))
+    asked = ONE.model_copy(update={"table_band": "1.4:25"})
+    assert stored_table(asked, stored(frequency=lines, **ones)) is not None
+
+
 def test_a_model_of_something_else_than_the_bare_frame_is_told(stored: Callable[..., BenchConfiguration]) -> None:
     other = stored(specimen="block with the spring of beta = 0.97")
     (said,) = EarthquakeCampaign(ONE, other).forecast.warnings

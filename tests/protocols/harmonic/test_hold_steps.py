@@ -3,7 +3,7 @@
 from collections.abc import Callable, Generator, Iterator
 from dataclasses import replace
 from itertools import repeat
-from math import nan, tau
+from math import inf, nan, tau
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,7 @@ from bench.config.sections import Acquisition
 from bench.control.oscillator import DriveCalibration
 from bench.control.sine import Sine
 from bench.control.stabiliser import DELAY, Stabiliser, StabiliserDesign
-from bench.engine.steps import Done, Dwell, Measured, Outcome, Publish, Scheduled, SetHarmonics, Step
+from bench.engine.steps import Done, Dwell, Fallen, Measured, Outcome, Publish, Scheduled, SetHarmonics, Step
 from bench.events import StepStarted
 from protocols.common.sine import holding
 from protocols.common.sine.holding import HoldCycle, hold, prepared, too_late
@@ -148,7 +148,8 @@ def held_by(
             if isinstance(step, Publish) and isinstance(step.event, StepStarted):
                 drifts = peaks(True)
             elif isinstance(step, Dwell):
-                answer = Measured((cycle(len(steps), next(drifts)),))
+                drift = next(drifts)
+                answer = Fallen() if drift == inf else Measured((cycle(len(steps), drift),))
             elif isinstance(step, SetHarmonics) and step.cycle is not None:
                 answer = Scheduled(late if step.cycle > DELAY + 1 else 0.0)
             step = plan.send(answer)
@@ -170,6 +171,18 @@ def test_a_released_motion_is_observed_up_to_the_first_drift_that_is_too_large(d
     assert result.rate is None
     assert cycles[-1].drift_peak == pytest.approx(1.01 * LARGEST)
     assert len(cycles) == result.cycles + 3
+
+
+def test_a_fall_after_the_release_leaves_what_was_measured_before(design: StabiliserDesign) -> None:
+    def peaks(released: bool) -> Iterator[float]:
+        yield from (DRIFT, DRIFT, inf) if released else ()
+        while True:
+            yield DRIFT
+
+    result, _, _ = held_by(design, peaks)
+    assert result.peak is not None
+    assert result.fallen
+    assert result.rate is None
 
 
 def test_an_estimate_that_is_not_finite_releases_the_hold(design: StabiliserDesign) -> None:

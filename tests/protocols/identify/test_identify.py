@@ -29,7 +29,7 @@ from bench.results import FILE
 from protocols.common.calibrate import Unmeasurable
 from protocols.common.identification.parameters import IdentifyParameters
 from protocols.common.identification.plan import OVERHEAD, Rules, _complete
-from protocols.common.identification.signal import BLOCK_SHARE, SHARE, grid, planned, settling
+from protocols.common.identification.signal import BLOCK_SHARE, SHARE, Grid, grid, planned, settling
 from protocols.identify.protocol import IdentifiedBand
 from sim.errors import InvalidInput
 from sim.excitation import SampledRecord
@@ -230,10 +230,13 @@ def test_what_cannot_be_identified_is_refused(changes: dict[str, float], says: s
         PROTOCOL.prepare(IdentifyParameters(**changes), bench(), None)  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("losses", [0, 1, 2])
-def test_a_multisine_with_missing_samples_is_repeated_once(losses: int) -> None:
-    volts, rules = np.zeros(100), Rules(Limits(), 1000.0, 20.0, 60.0)
-    running = _complete(volts, rules, "multisine 2")
+@pytest.mark.parametrize(("losses", "where"), [(0, 40), (1, 40), (2, 40), (0, 3), (0, 20), (0, 99)])
+def test_a_multisine_with_missing_samples_is_repeated_once(losses: int, where: int) -> None:
+    """Its first 38 samples and its last 8 are not used."""
+    volts, rules = np.zeros(106), Rules(Limits(), 1000.0, 20.0, 60.0)
+    lines = Grid(np.array([1]), 30, 1000.0, 1, 2)
+    assert lines.fade == 8
+    running = _complete(volts, rules, lines, "multisine 2")
     warned: list[str] = []
     plays = 0
 
@@ -244,9 +247,9 @@ def test_a_multisine_with_missing_samples_is_repeated_once(losses: int) -> None:
         if not isinstance(step, Play):
             return Done()
         plays += 1
-        signals = np.zeros((100, 6))
-        if plays <= losses:
-            signals[40:47, DISPLACEMENT] = np.nan
+        signals = np.zeros((106, 6))
+        if plays <= losses or where != 40:
+            signals[where : where + 7, DISPLACEMENT] = np.nan
         return Played(signals, volts)
 
     def finished() -> Outcome:
@@ -260,10 +263,10 @@ def test_a_multisine_with_missing_samples_is_repeated_once(losses: int) -> None:
     if losses < 2:
         outcome = finished()
         assert isinstance(outcome, Played)
-        assert np.isfinite(outcome.signals).all()
+        assert np.isfinite(outcome.signals).all() == (where == 40)
     else:
         with pytest.raises(Unmeasurable, match=r"multisine 2: .* missing in both attempts \(7 in the last one\)"):
             finished()
     assert warned == ["multisine 2: samples of the table's motion are missing (7); it is repeated"] * min(losses, 1)
     # the repetition is expected to take as long again
-    assert rules.expected == pytest.approx(60.0 + min(losses, 1) * (0.1 + OVERHEAD))
+    assert rules.expected == pytest.approx(60.0 + min(losses, 1) * (0.106 + OVERHEAD))

@@ -189,3 +189,15 @@ def test_a_design_exists_for_stable_orbits_too() -> None:
 def test_a_second_pair_of_nearly_equal_modulus_is_remarked() -> None:
     assert "second pair of multipliers, modulus 0.9736 at 148.8 degrees" in close_pair(orbit(15.6, 0.97))
     assert close_pair(orbit(15.0, 0.97)) == ""
+
+
+def test_a_test_over_amplitude_is_one_after_its_first_point_too() -> None:
+    curve = {
+        "amplitude_factor": np.array([1.01, 1.1]),
+        "omega_rad_s": np.array([15.3, 15.3]),
+        "table_modulus": np.array([1.02, 0.98]),
+        "fixed_modulus": np.array([1.03, 0.97]),
+    }
+    texts = boundary_texts([point(15.3, 1.02)], curve)
+    assert "predicted boundary on the simulated table: 1.0550" in texts
+    assert not any("rad/s" in text for text in texts)

@@ -82,3 +82,20 @@ def test_a_damaged_file_is_reported_too(tmp_path: Path) -> None:
 def test_paths_of_both_systems_are_removed() -> None:
     text = anonymised(r"cannot open C:\Users\jane\x.h5 nor /home/jane/x.h5; 3 m/s2", ())
     assert text == "cannot open (removed) nor (removed); 3 m/s2"
+
+
+def test_notes_names_and_paths_of_the_journal_are_removed() -> None:
+    note = {
+        "kind": "OperatorNote",
+        "text": "Mr. X leant on it (Jim Poe)",
+        "columns": {"text": "Mr. X", "by": "Jim Poe"},
+    }
+    answer = {"kind": "OperatorAnswered", "text": "confirmed", "columns": {"by": "Ann Lee", "after": 1.5}}
+    lines = "".join(json.dumps(each) + "\n" for each in (note, answer))
+    for secret in ("Mr. X", "Jim Poe", "Ann Lee"):
+        assert secret not in anonymised(lines, ())
+    kept = [json.loads(line) for line in anonymised(lines, ()).splitlines()]
+    assert kept[1] == {"kind": "OperatorAnswered", "text": "confirmed", "columns": {"by": "(removed)", "after": 1.5}}
+    for folder in ("C:\\Users\\Jane Doe\\bench", "/home/jane/My Lab"):
+        configuration = json.dumps({"table_model": f"{folder}/model.json", "seed": 3})
+        assert json.loads(anonymised(configuration, ())) == {"table_model": "(removed)", "seed": 3}

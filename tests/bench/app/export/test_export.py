@@ -277,6 +277,15 @@ def test_uff_comes_back_with_units_and_spacing_cut_where_samples_are_missing(
     assert (out / "points.csv").is_file()
 
 
+def test_raw_counts_in_uff_state_their_first_sample_in_full(campaign: Path, tmp_path: Path) -> None:
+    assert main(["export", str(campaign), "--to", "uff", "--raw", "--out", str(tmp_path / "raw")]) == 0
+    _, *sets = pyuff.UFF(str(tmp_path / "raw" / "run-2.uff")).read_sets()
+    for each in sets:
+        assert each["id5"].strip().endswith(f"of the run, {RATE!r} samples per second")
+    # the conversion, with its higher terms, is in a table beside it
+    assert "higher" in (tmp_path / "raw" / "channels.csv").read_text(encoding="utf-8").splitlines()[0]
+
+
 def test_a_signal_in_too_many_parts_is_refused_for_uff(
     campaign: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

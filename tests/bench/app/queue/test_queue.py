@@ -358,3 +358,37 @@ def test_while_a_queue_runs_nothing_is_added_to_it(session: FakeSession, capsys:
 def test_a_file_that_is_not_there_is_refused(session: FakeSession, capsys: pytest.CaptureFixture[str]) -> None:
     assert _queue(session) == 2
     assert "there is no such file" in capsys.readouterr().err
+
+
+def test_a_test_that_has_run_is_told_even_if_the_file_was_changed_meanwhile(
+    session: FakeSession, capsys: pytest.CaptureFixture[str]
+) -> None:
+    _write({"protocol": "harmonic"}, {"protocol": "harmonic"})
+
+    def save(_requests: Requests) -> None:
+        path = Path("queue.json")
+        path.write_text(path.read_text() + " ")
+
+    session.during = save
+    assert _queue(session) == 1
+    assert len(session.calls) == 1
+    said = capsys.readouterr().err
+    assert "test 1 completed" in said
+    assert "another program has changed the file" in said
+
+
+@pytest.mark.parametrize(
+    ("options", "item"),
+    [(["--dry-run"], "--dry-run"), (["--profile", "fast"], "--profile"), (["--yes", "--ask"], "--yes")],
+)
+def test_options_that_a_test_in_a_queue_cannot_have_are_refused(
+    session: FakeSession, capsys: pytest.CaptureFixture[str], options: list[str], item: str
+) -> None:
+    assert main_with(session, ["run", "harmonic", "--queue", "queue.json", *options]) == 2
+    assert f"{item} = " in capsys.readouterr().err
+    assert not Path("queue.json").exists()
+
+
+def test_an_added_test_is_one_object_with_json(session: FakeSession, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main_with(session, ["run", "harmonic", "--queue", "queue.json", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == {"queue": "queue.json", "test": 1}

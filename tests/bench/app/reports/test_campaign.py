@@ -176,6 +176,14 @@ def test_the_command_overwrites_only_when_asked(file: Path, tmp_path: Path, caps
     assert not pdf.exists()
 
 
+def test_the_command_never_overwrites_the_data(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    before = file.read_bytes()
+    other = file.parent / ".." / file.parent.name / file.name
+    assert main(["report", str(file), "--html", str(other), "--overwrite"]) == 2
+    assert "it is the data file itself" in capsys.readouterr().err
+    assert file.read_bytes() == before
+
+
 def test_the_command_writes_both_forms(reported: Reported) -> None:
     text = reported.html.read_text(encoding="utf-8")
     assert text.startswith("<!DOCTYPE html>")

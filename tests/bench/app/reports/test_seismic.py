@@ -8,7 +8,7 @@ import h5py
 import numpy as np
 import pytest
 
-from bench.analysis.signals import ACCELERATION, SignalMap
+from bench.analysis.signals import ACCELERATION, DRIFT, SignalMap
 from bench.app.catalogue import load_protocol
 from bench.app.cli.main import main
 from bench.app.reports.limits import limits_section
@@ -22,9 +22,10 @@ from bench.document.campaign import Campaign
 from bench.document.document import Listing, Picture, Table
 from bench.engine.steps import Arm, OperatorAction, Plan, Play, RampOut
 from bench.events import PointFinished, Warned
+from bench.figures.earthquake_figure import DriftPicture, drift_figure
 from bench.live_values import RunningGain
 from bench.testing.loopback import LoopbackRig
-from drivers.rig import Channel, OperatorTask
+from drivers.rig import Channel, Counts, OperatorTask
 from protocols.earthquake.measurement import GainMonitor
 from protocols.earthquake.protocol import EarthquakeParameters, EarthquakePoint, PointStatus
 from protocols.earthquake.report import played_records, seismic_sections, signals_of
@@ -166,6 +167,41 @@ def test_what_was_played_begins_at_the_sample_at_which_its_drive_began(tmp_path:
             np.testing.assert_allclose(shown[:, ACCELERATION], drive, atol=5.1e-4)
 
 
+class Swinging(LoopbackRig):
+    """Its second storey swings for some seconds after the rig is armed, and hangs 3 mm beside its zero at rest."""
+
+    def begin(self) -> None:
+        self.samples = 0
+
+    def respond(self, volts: np.ndarray) -> Counts:
+        t = (self.samples + np.arange(volts.size)) / self.sample_rate
+        self.samples += volts.size
+        self.response["laser_2"] = lambda driven: 0.02 * driven + 0.003 + 0.05 * np.exp(-t) * np.sin(9.0 * t + 1.0)
+        return super().respond(volts)
+
+
+def test_the_zero_of_the_drift_is_that_of_the_storeys_at_rest(tmp_path: Path) -> None:
+    bench = BenchConfiguration(
+        acquisition=Acquisition(lead=0.1), simulation=Simulation(bench=VirtualBenchParameters(sample_rate=1000.0))
+    )
+    drive = 0.8 * np.hanning(1000) * np.sin(0.02 * np.arange(1000))
+
+    def plan() -> Plan:
+        yield Arm(1.0)
+        yield Play(drive, GainMonitor("one", None, 1000.0))
+        yield RampOut()
+
+    assert recorded(tmp_path / "run.h5", plan(), Swinging(), bench, EarthquakePoint).status == "completed"
+    with open_datafile(tmp_path / "run.h5") as record:
+        (play,) = played_records(record)
+        # several seconds passed before the storeys were at rest
+        assert play.start - play.run > 3000
+        drift = signals_of(record, SignalMap(record.channels, bench.laser_reference), play, 1.0)[:, DRIFT]
+        expected = (0.02 - 0.001) * drive
+        np.testing.assert_allclose(drift, expected, atol=2.1e-3)
+        assert abs(float(np.mean(drift - expected))) < 3e-4
+
+
 def test_a_damaged_file_is_reported_and_says_so_first(
     file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -199,3 +235,11 @@ def test_the_report_says_who_with_what_software_and_which_parameters(file: Path)
     rows = {row[1]: row for row in parameters.rows}
     assert rows["--decay"] == ["duration of the free vibration measured after a record", "--decay", "5", "s"]
     assert rows["FILE"][2] == "synthetic:pacoima"
+
+
+def test_measured_and_predicted_drifts_have_their_own_intervals() -> None:
+    """At 2048 1/s, every 20th sample is drawn, but the prediction has a value every 10 ms."""
+    measured, predicted = np.sin(np.arange(300.0)), np.cos(np.arange(200.0))
+    figure = drift_figure([DriftPicture("one", None, 20.0 / 2048.0, measured, predicted, 0.01)])
+    ends = [float(line.get_xdata()[-1]) for line in figure.axes[0].get_lines() if len(line.get_xdata()) > 2]
+    assert sorted(ends) == pytest.approx([1.99, 299 * 20.0 / 2048.0])
