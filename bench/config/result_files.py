@@ -35,7 +35,11 @@ class KeptFile:
         text = json.dumps({**head, **content}, indent=1, ensure_ascii=False, allow_nan=False)
         if path.exists():
             raise InvalidInput(self.item, str(path), "the file exists and is never overwritten")
-        write_new(path, lambda unfinished: unfinished.write_text(text + "\n", encoding="utf-8", newline="\n"))
+
+        def write(unfinished: Path) -> None:
+            unfinished.write_text(text + "\n", encoding="utf-8", newline="\n")
+
+        write_new(path, write)
 
     def read(self, path: Path) -> dict[str, Any]:
         """Contents of a file without its header. Raises InvalidInput if the file cannot be read, or if its format or

@@ -24,6 +24,8 @@ LAST = 60.0
 """Duration of the data taken from the end of the file [s]."""
 PERSONAL = frozenset({"operator", "notes", "file", "journal", "by"})
 """Keys whose values contain names of people or paths."""
+NOTE = frozenset({"text", "columns"})
+"""Keys of a note's journal entry that contain the note."""
 REMOVED = "(removed)"
 _PATH = re.compile(r"(?:[A-Za-z]:\\|\\\\|/)[^\s\"',;:*?<>|]+")
 
@@ -76,7 +78,7 @@ def _without(content: Any, names: Sequence[str]) -> Any:
     """A value of JSON without personal data."""
     if isinstance(content, dict):
         members = cast(dict[str, Any], content)
-        hidden = PERSONAL | ({"text", "columns"} if members.get("kind") == OperatorNote.__name__ else frozenset())
+        hidden = PERSONAL | NOTE if members.get("kind") == OperatorNote.__name__ else PERSONAL
         return {
             key: REMOVED if key in hidden and value not in (None, "") else _without(value, names)
             for key, value in members.items()
