@@ -82,8 +82,8 @@ def open_file(
     path: Path, *, judging: bool | None = False, kinds: tuple[str, ...] = (FORMAT,), only: Sequence[str] = ()
 ) -> hdf5.File:
     """Open a file of one of the `kinds`; see `bench.datafile.reader.open_datafile`. With `judging` None, a file that
-    its writer has not closed is opened to be judged. `only` names the members of
-    /entry that the caller reads, so that only these are checked; by default, all are.
+    its writer has not closed is opened to be judged. `only` names the members of /entry that the caller reads, so that
+    only these are checked; by default, all are.
     """
     if path.is_dir():
         raise InvalidInput("record", str(path), "it is a directory; specify a file in it")

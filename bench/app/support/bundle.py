@@ -63,13 +63,13 @@ def anonymised(text: str, names: Sequence[str]) -> str:
     """The text without `names`, paths, notes and values of PERSONAL keys. JSON, and lines of JSON, remain valid."""
     try:
         return json.dumps(_without(json.loads(text), names), indent=1, ensure_ascii=False) + "\n"
-    except ValueError:
+    except (ValueError, RecursionError):
         return "".join(_anonymised_line(line, names) for line in text.splitlines(keepends=True))
 
 
 def _anonymised_line(line: str, names: Sequence[str]) -> str:
     if line.startswith("{"):
-        with suppress(ValueError):
+        with suppress(ValueError, RecursionError):
             return json.dumps(_without(json.loads(line), names), ensure_ascii=False) + "\n"
     return _plain(line, names)
 
@@ -119,7 +119,7 @@ def _personal_names(path: Path) -> tuple[str, ...]:
     names = [str(Path.home())]
     with suppress(OSError):
         for line in journal_path(path).read_text(encoding="utf-8", errors="replace").splitlines():
-            with suppress(ValueError, AttributeError, LookupError, TypeError):
+            with suppress(ValueError, AttributeError, LookupError, TypeError, RecursionError):
                 names += [by] if isinstance(by := json.loads(line)["columns"].get("by"), str) and len(by) > 1 else []
     try:
         with open_datafile(path) as record:
