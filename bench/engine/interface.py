@@ -92,6 +92,7 @@ class Requests:
         self._abort: _Made | None = None
         self._halt: _Made | None = None
         self._cut: Callable[[], None] | None = None
+        self._arming = False
         self.interrupted = False
         """Whether an operating-system signal caused the request: the session then exits as soon as the rig is at rest.
         """
@@ -133,17 +134,35 @@ class Requests:
         """Register `cut`, which `halt` calls in the requesting thread."""
         self._cut = cut
 
+    @contextmanager
+    def arming(self) -> Generator[None]:
+        """Context manager for the arming of the rig, which may take many seconds: every request cuts the enable line at
+        once, so that the amplifier is not enabled after it. The drive is zero.
+        """
+        self._arming = True
+        try:
+            yield
+        finally:
+            self._arming = False
+
     def stop(self, why: str = "stop requested", code: CauseCode = CauseCode.REQUEST) -> None:
         """Request a smooth ramp to zero; the measurement remains valid. The first `why` is recorded as the reason."""
         self._stop = self._stop or (why, Cause(code, "stop"))
+        if self._arming:
+            self._cut_now()
 
     def abort(self, why: str = "abort requested", code: CauseCode = CauseCode.REQUEST) -> None:
         """Request a fast ramp to zero; the run becomes invalid."""
         self._abort = self._abort or (why, Cause(code, "abort"))
+        if self._arming:
+            self._cut_now()
 
     def halt(self, why: str = "halt requested", code: CauseCode = CauseCode.REQUEST) -> None:
         """Cut the enable line now, in this thread; the loop then finds the rig halted and ends."""
         self._halt = self._halt or (why, Cause(code, "halt"))
+        self._cut_now()
+
+    def _cut_now(self) -> None:
         if self._cut is not None:
             # the loop cuts the line again and reports a failure
             with suppress(RigError):

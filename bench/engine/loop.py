@@ -34,9 +34,12 @@ from bench.events import LimitExceeded, State, Warned
 from bench.guard.guard import Exchange, Guard
 from bench.guard.limits import Violation, amount
 from bench.plugins import plugin_code
-from drivers.rig import Alignment, Counts, Rig
+from drivers.rig import Alignment, Counts, Rig, RigError
 from sim.errors import UNKNOWN, Cause, CauseCode, InvalidInput, RockbenchError
 from sim.specimen import Specimen
+
+_STATUS = {"halt": "halted", "abort": "aborted", "stop": "stopped"}
+"""Status of a run that a request ends while the rig is being armed."""
 
 
 class Loop:
@@ -55,12 +58,24 @@ class Loop:
         self._runaway: Violation | None = None
 
     def begin(self, reason: str) -> None:
-        """Arm the rig with samples of 0 V queued."""
+        """Arm the rig with samples of 0 V queued. A request while it is being armed ends the run with the enable line
+        cut, because the drive is zero and somebody may be at the table.
+        """
         self._over = self._runaway = None
         self.check_requests()
-        self.output.arm(reason)
-        # a halt requested while the rig was being armed could not yet cut the enable line
-        self.check_requests()
+        try:
+            with self._requests.arming():
+                if self._requests.strongest is None:
+                    self.output.arm(reason)
+        except RigError:
+            # a rig whose enable line was cut refuses to be armed
+            if self._requests.strongest is None:
+                raise
+        if not self.output.driven:
+            self.check_requests()
+        if self._requests.strongest is not None:
+            status = _STATUS[self._requests.strongest]
+            raise Ended(self.output.cut(Ending(status, self._requests.reason, self._requests.cause)))
 
     def exchange(self) -> Exchange:
         """Run one iteration: exchange a block, publish its warnings, check its limits and the requests."""

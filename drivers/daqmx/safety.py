@@ -212,9 +212,13 @@ HEARTBEAT_TASK = "rockbench_heartbeat"
 
 
 class Heartbeat:
-    """Heartbeat output. After construction the line is low and its task stopped."""
+    """Heartbeat output of a relay that opens `timeout` [s] after the last rising edge. After construction the line is
+    low and its task stopped.
+    """
 
-    def __init__(self, connection: Connection, line: str) -> None:
+    def __init__(self, connection: Connection, line: str, timeout: float) -> None:
+        self._timeout = timeout
+        self._opens: float | None = None
         with translated("creating the task of the heartbeat line"):
             self._task = library.task(HEARTBEAT_TASK, connection.options(HEARTBEAT_TASK))
         try:
@@ -226,11 +230,28 @@ class Heartbeat:
             self.close()
             raise
 
-    def beat(self) -> None:
-        """Toggle the line; the first edge after `rest()` is a rising one."""
+    def beat(self, *, driving: bool = False) -> None:
+        """Toggle the line; the first edge after `rest()` is a rising one.
+
+        With `driving`, raises RigError instead of a rising edge if the relay has opened since the last one, because
+        the edge would close it again in the middle of the motion.
+        """
+        begun = time.monotonic()
+        if driving and not self._high and self._opens is not None and begun > self._opens:
+            late = begun - self._opens + self._timeout
+            raise RigError(
+                f"the heartbeat relay has opened: its line had no rising edge for {late:.2g} s, its time-out is "
+                f"{self._timeout:g} s; increase hardware.daq.heartbeat.timeout and the time-out of the relay, or find "
+                "what delays the program"
+            )
         with translated("toggling the heartbeat line"):
             self._writer.write_one_sample_one_line(not self._high, _TIME)
         self._high = not self._high
+        if not driving:
+            # the relay may open until the first sample, because the drive is zero
+            self._opens = None
+        elif self._high:
+            self._opens = begun + self._timeout
 
     def rest(self) -> None:
         """Set the line low and release it; the line keeps its state."""

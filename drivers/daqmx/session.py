@@ -280,7 +280,7 @@ class DaqSession:
         # under the lock, so that no edge follows once a stop has set the line low
         with self._lock:
             if self._tasks.heartbeat is not None and self._is_enabled:
-                self._tasks.heartbeat.beat()
+                self._tasks.heartbeat.beat(driving=self._state is _State.RUNNING)
 
     @contextmanager
     def _resting_on_failure(self) -> Generator[None]:

@@ -65,7 +65,7 @@ class Tasks:
                     self.watchdog = Watchdog(connection, daq.enable_line, daq.watchdog, chassis, daq.output)
                     made.callback(_quietly, self.watchdog.close)
             if daq.heartbeat is not None:
-                self.heartbeat = Heartbeat(connection, daq.heartbeat.line)
+                self.heartbeat = Heartbeat(connection, daq.heartbeat.line, daq.heartbeat.timeout)
                 made.callback(_quietly, self.heartbeat.close)
             if daq.safety_inputs:
                 self.safety = SafetyInputs(connection, daq.safety_inputs)

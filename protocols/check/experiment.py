@@ -46,6 +46,7 @@ from protocols.check.protocol import MARKS, CheckParameters, allowed_range, numb
 from protocols.common.calibrate import (
     CHANGE_TIME,
     SETTLING,
+    STOREYS_CLAMPED,
     Unmeasurable,
     calibrate_drive,
     complete_cycles,
@@ -82,6 +83,7 @@ class LoopCheck(Prepared[CheckParameters]):
         self, parameters: CheckParameters, configuration: BenchConfiguration, stored: Sources | None = None
     ) -> None:
         super().__init__(parameters, configuration, stored)
+        self._clamped = False
         limits, velocity = self.configuration.limits, self.parameters.velocity
         slow, fast = min(self.parameters.omega), max(self.parameters.omega)
         reach = min(self.configuration.half_stroke, limits.displacement)
@@ -112,8 +114,18 @@ class LoopCheck(Prepared[CheckParameters]):
         }
 
     def plan(self) -> Plan:
-        found = yield from self.collected(_steps(self.parameters, self.configuration))
+        self._clamped = False
+        found = yield from self.collected(self._steps())
         return self._result(found.points, complete=True)
+
+    def _steps(self) -> Generator[Step, Outcome, None]:
+        """Steps of the check; each line is published as a point as soon as it has been measured."""
+        bare = self.configuration.known_specimen.bare()
+        yield OperatorAction(OperatorTask.LOCK_FRAME, bare, _CLAMP)
+        self._clamped = True
+        yield from _clamped_steps(self.parameters, self.configuration)
+        yield OperatorAction(OperatorTask.UNLOCK_FRAME, bare, _UNCLAMP)
+        self._clamped = False
 
     def result(self, points: Sequence[Parameters]) -> Result:
         return self._result(points, complete=False)
@@ -121,18 +133,16 @@ class LoopCheck(Prepared[CheckParameters]):
     def _result(self, points: Sequence[Parameters], *, complete: bool) -> Result:
         """Result of a complete or interrupted check; an interrupted one has not passed, since lines are missing."""
         lines = [point for point in points if isinstance(point, CheckLine)]
+        text = _table(lines, complete=complete)
         return Result(
             points=tuple(points),
-            text=_table(lines, complete=complete),
+            text=f"{text}\n{STOREYS_CLAMPED}" if self._clamped else text,
             figures={"margins.png": lambda path: write_figure(path, _margins(lines))},
             passed=complete and all(line.verdict is not Verdict.FAILED for line in lines),
         )
 
 
-def _steps(parameters: CheckParameters, configuration: BenchConfiguration) -> Generator[Step, Outcome, None]:
-    """Steps of the check; each line is published as a point as soon as it has been measured."""
-    bare = configuration.known_specimen.bare()
-    yield OperatorAction(OperatorTask.LOCK_FRAME, bare, _CLAMP)
+def _clamped_steps(parameters: CheckParameters, configuration: BenchConfiguration) -> Generator[Step, Outcome, None]:
     yield Publish(StepStarted("acquire at rest"))
     at_rest = yield AcquireAtRest(parameters.rest)
     if not isinstance(at_rest, RestSamples):
@@ -151,7 +161,6 @@ def _steps(parameters: CheckParameters, configuration: BenchConfiguration) -> Ge
         yield from _publish([untested("bench", "motion", remedy)])
     else:
         yield from _motion(parameters, configuration)
-    yield OperatorAction(OperatorTask.UNLOCK_FRAME, bare, _UNCLAMP)
 
 
 def _motion(parameters: CheckParameters, configuration: BenchConfiguration) -> Generator[Step, Outcome, None]:

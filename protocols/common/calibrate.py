@@ -128,6 +128,10 @@ def drive_response(cycles: Sequence[Cycle]) -> complex:
     return complex(np.vdot(driven, moved) / np.vdot(driven, driven))
 
 
+STOREYS_CLAMPED = "THE STOREYS ARE STILL CLAMPED: remove the clamps before the table is driven."
+"""Remark on a run that ended before the operator was asked to remove the clamps."""
+
+
 class Unmeasurable(RockbenchError):
     """The signals are not sufficient to continue the protocol."""
 

@@ -22,7 +22,7 @@ from bench.findings import SpecimenIdentified
 from bench.preflight.margins import Forecast
 from bench.protocol import Plan, Prepared, Result, Sources
 from drivers.rig import OperatorTask
-from protocols.common.decays.findings import check_masses, mass_warning
+from protocols.common.decays.findings import check_masses, impossible_values, mass_warning
 from protocols.common.decays.frame import SIGNIFICANT, FrameResult, frame_result, nonlinear_text
 from protocols.common.decays.pulse import frequencies, plan_pulse, pulse_forecast
 from protocols.common.decays.recording import Pace, fit_setting, pulsed_decays, pulsed_duration
@@ -40,7 +40,7 @@ from protocols.coupling_stiffness.springs import (
     spring_result,
 )
 from sim.errors import InvalidInput, RockbenchError
-from sim.identified import Identified
+from sim.identified import Identified, possible, spring_name
 from sim.parameters import Parameters
 from sim.specimen import Specimen
 
@@ -135,6 +135,10 @@ class CouplingStiffness(Prepared[CouplingStiffnessParameters]):
             if (off := frame_change(found, configuration.identified)) is not None:
                 yield Publish(Warned(f"the bare frame has changed since it was identified: {off}"))
             yield Publish(PointFinished(bare_point(found, 0)))
+            if (left_out := impossible_values(found)) is not None:
+                yield Publish(Warned(left_out))
+            known = configuration.identified or Identified()
+            yield Publish(SpecimenIdentified(known.extended(*spring_findings(found, [], known))))
         if reference is None:
             raise AssertionError("unreachable: a run without a reference is refused")
         failed: RockbenchError | None = None
@@ -178,6 +182,13 @@ class CouplingStiffness(Prepared[CouplingStiffnessParameters]):
                     f"{name}: k2 differs from its value for the bare frame by {spring.k2_apart:+.1f} standard "
                     "uncertainties: check whether the block, its clamp or the spring touches the second storey, and "
                     "whether the clamp yields under the force of the spring",
+                )
+            )
+        if not possible(spring_name(beta), spring.k_c):
+            yield Publish(
+                Warned(
+                    f"{name}: k_C = {spring.k_c:.3g} N/m is physically impossible and not stored for other runs, which "
+                    "keep an earlier value, if there is one: check whether the spring is mounted"
                 )
             )
         yield Publish(PointFinished(point(held, 0)))

@@ -44,7 +44,7 @@ Array = NDArray[np.float64]
 STILL = 2e-3
 """Allowed scatter of the signals at rest [m], for a block held by hand."""
 
-LOCK = "Clamp the table to the ground, so that no impact moves it. It is not driven: leave the amplifier off."
+LOCK = "Clamp the table to the ground, so that no impact moves it. The drive stays at zero."
 UNLOCK = "Remove the clamps from the table."
 BACK = "Aim laser 2 at storey 2 again."
 

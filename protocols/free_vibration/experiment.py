@@ -40,6 +40,7 @@ from protocols.common.decays.pulse import (
     pulse_forecast,
 )
 from protocols.common.decays.recording import (
+    BY_HAND,
     WAITING,
     Pace,
     fit_setting,
@@ -204,7 +205,7 @@ def _released_decays(
             "has begun, release it without a push."
         )
         yield OperatorAction(OperatorTask.PULL_FRAME, specimen, request, pull)
-        signals = yield from record(silence, setting.sample_rate, pace, activity)
+        signals = yield from record(silence, setting.sample_rate, pace, activity, BY_HAND)
         return released_decay(signals, setting)
 
     how = f"release by hand, decay of {window:.0f} s"

@@ -52,16 +52,27 @@ def trials(
             held = possible and slow(coupled, omega, amplitude)
             patience = PATIENCE + (MODEL_FREE_PATIENCE if parameters.model_free else PATIENCE)
             extra = patience * tau / omega if held else 0.0
-            control = parameters.hold_authority if held else 0.0
+            authority = parameters.hold_authority if possible else 0.0
             again = held and parameters.model_free
             pause = stable_above(coupled, omega, amplitude) if again else None
             for number, start in enumerate(planned, 1):
                 name = f"start {number} of beta = {beta:g} at omega = {omega:g} rad/s"
                 stage = Stage(name, start.segments, start.chance)
+                # any motion that does not become steady is held, which is not expected here
+                control = authority if held else _beyond(start.segments, authority)
                 yield Trial(stage, coupled, (), HOLD, longest + extra, beta, omega, control)
                 if again and (segments := with_pause(start, pause)) != start.segments:
                     stage = Stage(f"second {name}", segments, start.chance)
-                    yield Trial(stage, coupled, (), HOLD, extra, beta, omega, control)
+                    yield Trial(stage, coupled, (), HOLD, extra, beta, omega, authority)
+
+
+def _beyond(segments: Sequence[Segment], authority: float) -> float:
+    """Share by which the drive of a hold with this `authority` may exceed the largest sine of a start at the same
+    frequency.
+    """
+    last = segments[-1]
+    largest = max(each.amplitude for each in segments if each.omega == last.omega)
+    return max((1.0 + authority) * last.amplitude / largest - 1.0, 0.0)
 
 
 def _bare_tests(parameters: HarmonicParameters, specimen: Specimen) -> Iterator[Trial]:

@@ -15,7 +15,7 @@ from bench.config.result_files import write_calibration
 from bench.control.oscillator import Segment, program
 from bench.datafile.tables import Column, Table
 from bench.engine.steps import OperatorAction, Outcome, Publish, Step
-from bench.events import PointFinished
+from bench.events import PointFinished, Warned
 from bench.figures.style import BLACK, BLUE, GREY, new_figure, set_grid, ticks_1_2_5, write_figure
 from bench.figures.text_table import TextColumn, text_table
 from bench.findings import FitFinished, FittedParameter, Series
@@ -24,11 +24,11 @@ from bench.preflight.margins import Forecast
 from bench.preflight.motion import laser_demands
 from bench.protocol import Plan, Prepared, Result, Sources
 from drivers.rig import OperatorTask
-from protocols.common.calibrate import Unmeasurable
-from protocols.laser_calibration.fit import ErrorCurve
+from protocols.common.calibrate import STOREYS_CLAMPED
+from protocols.laser_calibration.fit import ErrorCurve, disagreements
 from protocols.laser_calibration.plan import START, expected_duration, measure, planned_passes
 from protocols.laser_calibration.protocol import CalibratedSensor, LaserCalibrationParameters
-from sim.errors import InvalidInput
+from sim.errors import InvalidInput, RockbenchError
 from sim.parameters import Parameters
 
 if TYPE_CHECKING:
@@ -65,6 +65,7 @@ class LaserCalibrationRun(Prepared[LaserCalibrationParameters]):
         super().__init__(parameters, configuration, stored)
         self._found: LaserCalibration | None = None
         self._curves: tuple[ErrorCurve, ErrorCurve] | None = None
+        self._clamped = False
         p, limits = self.parameters, configuration.limits
         if configuration.laser_reference != "ground":
             raise InvalidInput(
@@ -125,25 +126,31 @@ class LaserCalibrationRun(Prepared[LaserCalibrationParameters]):
 
     def plan(self) -> Plan:
         self._found = self._curves = None
+        self._clamped = False
         return self.collected(self._steps())
 
     def _steps(self) -> Generator[Step, Outcome, None]:
-        """Steps: clamp the storeys to the table, measure, publish, remove the clamps. Raises Unmeasurable, after the
-        clamps are removed, if the measurement fails.
+        """Steps: clamp the storeys to the table, measure, publish, remove the clamps. Raises the error of a measurement
+        that fails, after the clamps are removed.
         """
         bare = self.configuration.known_specimen.bare()
         yield OperatorAction(OperatorTask.LOCK_FRAME, bare, _CLAMP)
+        self._clamped = True
         try:
             found, curves = yield from measure(self.parameters, self.configuration)
-        except Unmeasurable:
+        except RockbenchError:
             yield OperatorAction(OperatorTask.UNLOCK_FRAME, bare, _UNCLAMP)
+            self._clamped = False
             raise
+        for remark in disagreements(found, curves, self.configuration):
+            yield Publish(Warned(remark))
         self._found, self._curves = found, curves
         for number, (curve, laser) in enumerate(zip(curves, found.lasers, strict=True), 1):
             yield Publish(_fit_event(f"laser_{number}", curve, laser.delay, laser.delay_uncertainty))
         for point in _calibrated_sensors(found):
             yield Publish(PointFinished(point))
         yield OperatorAction(OperatorTask.UNLOCK_FRAME, bare, _UNCLAMP)
+        self._clamped = False
 
     def result(self, points: Sequence[Parameters]) -> Result:
         found, curves = self._found, self._curves
@@ -152,9 +159,10 @@ class LaserCalibrationRun(Prepared[LaserCalibrationParameters]):
             if found is not None:
                 write_calibration(path, found)
 
+        text = _sensors_table([point for point in points if isinstance(point, CalibratedSensor)])
         return Result(
             points=tuple(points),
-            text=_sensors_table([point for point in points if isinstance(point, CalibratedSensor)]),
+            text=f"{text}\n{STOREYS_CLAMPED}" if self._clamped else text,
             figures={"laser_errors.png": lambda path: write_figure(path, _errors_figure(curves))},
             files={} if found is None else {"laser_calibration.json": write},
         )

@@ -21,7 +21,7 @@ sensors and each laser are therefore compared with the mean span of both lasers.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
-from math import sqrt
+from math import hypot, sqrt
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -31,6 +31,9 @@ from bench.analysis.cycles import Cycle, mean_waves
 from bench.analysis.laser_calibration import LaserCalibration, LaserCurve
 from bench.analysis.sensor_accuracy import SensorAccuracy
 from bench.analysis.signals import ACCELERATION, DISPLACEMENT, LASER_1, LASER_2
+from bench.analysis.uncertainty import COVERAGE
+from bench.config.model import BenchConfiguration
+from protocols.common.calibrate import Unmeasurable
 
 Array = NDArray[np.float64]
 
@@ -186,9 +189,12 @@ def calibration(
         )
         for curve, rest, device, slope in zip(curves, rests, devices, slopes, strict=True)
     ]
-    span = min(curve.high - curve.low for curve in curves)
+    span = _span(curves)
     ratios = np.array([each.ratio for each in passes])
-    standard = np.sqrt(np.mean([_span_uncertainty(span, accuracy, whole) ** 2 for whole in ranges]) / 2.0)
+    sizes = [_span_uncertainty(span, accuracy, whole) for whole in ranges]
+    standard = np.sqrt(np.mean(np.square(sizes)) / 2.0)
+    # two standards that disagree by more than they should leave half of the excess to their mean
+    excess = 0.5 * sqrt(max((slopes[1] - slopes[0]) ** 2 - float(np.sum(np.square(COVERAGE * np.array(sizes)))), 0.0))
     scatter = np.hypot(np.std(ratios, ddof=1) / sqrt(len(passes)), jackknife((curves[0].slopes + curves[1].slopes) / 2))
     # an error of the curves also changes their slopes
     bent = np.hypot(curves[0].uncertainty, curves[1].uncertainty) / (0.5 * span)
@@ -202,8 +208,56 @@ def calibration(
         common_linearity=reference_linearity * span,
         table_displacement=factor,
         table_acceleration=factor * float(ratios.mean()),
-        table_uncertainty=float(np.hypot(standard, scatter)),
+        table_uncertainty=float(np.hypot(np.hypot(standard, excess), scatter)),
     )
+
+
+IMPLAUSIBLE = 3.0
+"""Ratio of a difference between scales to its standard uncertainty above which an error of a sensor is likely."""
+
+DISAGREE = 0.05
+"""Largest relative difference between the spans of two lasers that measure the same motion; a larger one is no error of
+scale.
+"""
+
+
+def require_agreement(curves: tuple[ErrorCurve, ErrorCurve]) -> None:
+    """Raise Unmeasurable if the lasers do not measure the same motion."""
+    first, second = (curve.slope for curve in curves)
+    if not abs(second - first) <= DISAGREE:
+        raise Unmeasurable(
+            f"the spans of the two lasers differ by {100.0 * (second - first):+.1f} %, although both measure the "
+            "motion of the table: check where they are aimed, their ranges, and the load resistors of analogue outputs"
+        )
+
+
+def disagreements(
+    found: LaserCalibration, curves: tuple[ErrorCurve, ErrorCurve], configuration: BenchConfiguration
+) -> list[str]:
+    """Remarks on sensors whose scales differ by more than `IMPLAUSIBLE` times the uncertainty of their difference."""
+    accuracy, span = configuration.analysis, _span(curves)
+    sizes = [_span_uncertainty(span, accuracy, whole) for whole in configuration.laser_ranges]
+    lasers, remarks = curves[1].slope - curves[0].slope, list[str]()
+    if abs(lasers) > (bound := IMPLAUSIBLE * hypot(*sizes)):
+        remarks.append(
+            f"the spans of the two lasers differ by {100.0 * lasers:+.2f} %, more than their data sheets allow "
+            f"({100.0 * bound:.2f} %): check their ranges and the load resistors of analogue outputs; the uncertainty "
+            "of the table's scale contains the difference"
+        )
+    standard = float(np.sqrt(np.mean(np.square(sizes)) / 2.0))
+    bound = IMPLAUSIBLE * hypot(standard, accuracy.table_scale)
+    for name, factor in (("displacement", found.table_displacement), ("acceleration", found.table_acceleration)):
+        if abs(factor - 1.0) > bound:
+            remarks.append(
+                f"the scale of the table's {name} differs by {100.0 * (factor - 1.0):+.2f} % from that of the lasers, "
+                f"more than the data sheets allow ({100.0 * bound:.2f} %): check its sensitivity in the configuration"
+            )
+    return remarks
+
+
+def _span(curves: tuple[ErrorCurve, ErrorCurve]) -> float:
+    """Span of the readings that both lasers cover [m]."""
+    return min(curve.high - curve.low for curve in curves)
 
 
 def _span_uncertainty(span: float, accuracy: SensorAccuracy, whole: float) -> float:

@@ -24,7 +24,7 @@ from bench.engine.steps import (
 )
 from bench.events import Progress, StepStarted
 from protocols.common.calibrate import SETTLING, Unmeasurable, calibrate_drive, complete_cycles, probed_drive
-from protocols.laser_calibration.fit import ErrorCurve, Pass, calibration, fit_curve, mean_pass
+from protocols.laser_calibration.fit import ErrorCurve, Pass, calibration, fit_curve, mean_pass, require_agreement
 from protocols.laser_calibration.protocol import LaserCalibrationParameters
 from sim.channel import STOREYS
 
@@ -89,6 +89,7 @@ def measure(
         raise
     yield RampOut()
     curves = fit_curve(passes, 0, rests[0]), fit_curve(passes, 1, rests[1])
+    require_agreement(curves)
     devices = {channel.name: channel.device for channel in at_rest.channels}
     found = calibration(
         passes,

@@ -56,7 +56,7 @@ class Decay:
     """One decay: the `quantities` of `response.NAMES`, shape (8,), their uncertainty, the underlying fit, the damping
     of each mode against its amplitude, and the end of the excitation (`begin` [s]).
 
-    `peak` [m] is the largest measured drift of storey 2 relative to storey 1.
+    `peak` [m] is the largest measured drift of storey 2 relative to storey 1, from rest.
     """
 
     quantities: Array
@@ -99,6 +99,8 @@ def _decay(stretch: Stretch, setting: Setting, quiet: float, begin: float) -> De
     _require_decay(fit)
     errors = Errors(setting.sensors, quiet, setting.masses_covariance)
     found = quantities(fit.constants)
+    # relative to rest, which the zero of a storey held by hand is not
+    moved = stretch.readings - fit.values[OFFSETS][:, None]
     ratios, omegas = found[XI1 : XI1 + 2], found[OMEGA1 : OMEGA1 + 2]
     return Decay(
         quantities=found,
@@ -106,7 +108,7 @@ def _decay(stretch: Stretch, setting: Setting, quiet: float, begin: float) -> De
         fit=fit,
         courses=damping_courses(fit, errors, begin, ratios, omegas),
         begin=begin,
-        peak=float(np.nanmax(np.abs(stretch.readings[1] - stretch.readings[0]))),
+        peak=float(np.nanmax(np.abs(moved[1] - moved[0]))),
     )
 
 

@@ -94,8 +94,8 @@ def benchmark(
     """Measure speed and error of the engine and of comparable integrators.
 
     Prints tables and writes benchmark.md and benchmark.json, with machine and versions, and the figure
-    work_precision.png. Integrators that are not installed are marked; `uv sync --inexact --group benchmark` installs them. The
-    exit code does not depend on the numbers: it is 0, or 2 if an input was refused or a timed command failed.
+    work_precision.png. Integrators that are not installed are marked; `uv sync --inexact --group benchmark` installs
+    them. The exit code does not depend on the numbers: it is 0, or 2 if an input was refused or a timed command failed.
     """
     progress("loading the program")
     from bench.app.benchmark.suite import FULL, QUICK, RESULTS, run_benchmark

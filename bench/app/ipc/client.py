@@ -31,6 +31,7 @@ from bench.app.ipc.messages import (
     Refused,
     Run,
     Traces,
+    ended_by_files,
     receive,
 )
 from bench.app.ipc.sessions import RunningSession, open_listener
@@ -154,13 +155,7 @@ class ClientConnection:
         """The end of a run as stated in its summary file, to replace a lost final message; None without a readable
         file.
         """
-        if self._out is None:
-            return None
-        with suppress(OSError, ValueError, KeyError):
-            content = json.loads((self._out / SUMMARY).read_text(encoding="utf-8"))
-            passed = content.get("passed", True) is not False
-            return Ended(content["status"], content["reason"], content, "", self._out, passed)
-        return None
+        return None if self._out is None else ended_by_files(self._out)
 
 
 class SessionClient(ClientConnection):

@@ -1,7 +1,9 @@
 """Messages between a session and its clients, pickled over connections that only this user's processes can open."""
 
+import json
 import pickle
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -14,6 +16,7 @@ from bench.config.model import BenchConfiguration
 from bench.datafile.tables import Column, Table
 from bench.events import Event, State
 from bench.preflight.margins import Margin
+from bench.results import SUMMARY
 from sim.errors import UNKNOWN, Cause
 from sim.parameters import Parameters
 
@@ -317,3 +320,12 @@ def extremes(values: NDArray[np.float64], width: int) -> tuple[NDArray[np.float3
     low = np.fmin.reduceat(values, starts, axis=0)
     high = np.fmax.reduceat(values, starts, axis=0)
     return low.astype(np.float32), high.astype(np.float32)
+
+
+def ended_by_files(out: Path) -> Ended | None:
+    """The end of the run in the folder `out` as stated in its summary file; None without a readable file."""
+    with suppress(OSError, ValueError, KeyError):
+        content = json.loads((out / SUMMARY).read_text(encoding="utf-8"))
+        passed = content.get("passed", True) is not False
+        return Ended(content["status"], content["reason"], content, "", out, passed)
+    return None

@@ -13,7 +13,7 @@ from types import FrameType
 
 from bench.app.catalogue import load_protocol
 from bench.app.ipc.announcement import announced
-from bench.app.ipc.messages import FromSession, PlanCheck, PlanChecked, Refused, Run
+from bench.app.ipc.messages import FromSession, PlanCheck, PlanChecked, Refused, Run, ended_by_files
 from bench.app.ipc.server import FAREWELL, Publisher, RemoteOperator, SessionServer, ended_message
 from bench.app.preflight import compile_run, prepare
 from bench.app.session import run_session
@@ -51,7 +51,10 @@ def serve(connection: Connection) -> None:
         else:
             last = _check_plan(assignment)
     except KeyboardInterrupt:
-        host.close(Refused(f"ended before anything moved: {requests.reason}", requests.cause), FAREWELL)
+        refused = Refused(f"ended before anything moved: {requests.reason}", requests.cause)
+        # the results of a run whose figures were being drawn are complete
+        ended = ended_by_files(assignment.out) if isinstance(assignment, Run) else None
+        host.close(ended or refused, FAREWELL)
         # a normal exit would call the destructors of the objects of an interrupted call
         os._exit(0)
     except InvalidInput as error:

@@ -16,7 +16,7 @@ class Feed:
     def __init__(self) -> None:
         self._changed = threading.Condition()
         self._parts: dict[str, tuple[int, bytes]] = {}
-        self._version = 0
+        self._version = self._publications = 0
         self._read = -WANTED
         self.closed = False
 
@@ -37,14 +37,19 @@ class Feed:
             if changed:
                 self._version += 1
                 self._parts.update({name: (self._version, text) for name, text in changed.items()})
-                self._changed.notify_all()
+            self._publications += 1
+            self._changed.notify_all()
 
     def since(self, version: int, timeout: float) -> tuple[int, bytes]:
         """The current version, and the parts that changed after `version` (0 for all) as a JSON object. Waits up to
         `timeout` [s] for a change; without one, the object is empty.
         """
         with self._changed:
+            stale, known = not self.has_readers, self._publications
             self._read = now()
+            if stale:
+                # without readers the document is not kept up to date: wait for the next one
+                self._changed.wait_for(lambda: self._publications > known or self.closed, timeout)
             self._changed.wait_for(lambda: self._version > version or self.closed, timeout)
             found = [(name, text) for name, (number, text) in self._parts.items() if number > version]
             return self._version, b"{%b}" % b",".join(b'"%b":%b' % (name.encode(), text) for name, text in found)

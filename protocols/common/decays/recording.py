@@ -79,9 +79,20 @@ class Pace:
         return progress
 
 
-def record(volts: Array, sample_rate: float, pace: Pace, activity: str) -> Generator[Step, Outcome, Array]:
+AT_REST = Arm(REST, STILL)
+"""Arming of a recording that begins with the storeys at rest."""
+
+BY_HAND = Arm(REST, still=2e-3, patience=REST)
+"""Arming of a recording that begins with a storey held by a hand, which is never still; the fit determines the offsets
+of the lasers.
+"""
+
+
+def record(
+    volts: Array, sample_rate: float, pace: Pace, activity: str, arming: Arm = AT_REST
+) -> Generator[Step, Outcome, Array]:
     """Arm, play and ramp out. Returns the signals, shape (n, 6). Raises Unmeasurable if a fall is detected."""
-    yield Arm(REST, STILL)
+    yield arming
     outcome = yield Play(volts, pace.watch(sample_rate, activity))
     end = yield RampOut(fast=isinstance(outcome, Fallen))
     pace.elapsed += volts.size / sample_rate + WAITING

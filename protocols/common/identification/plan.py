@@ -130,7 +130,7 @@ def probed_response(motion: Complex, grid: Grid, rules: Rules) -> Generator[Step
     for probe in range(1, _MOST + 1):
         rules.require_drive(short.record(drive))
         yield Publish(StepStarted(f"probe {probe}: {_peak(drive, short):.3g} V"))
-        outcome = yield from played(short.record(drive), rules)
+        outcome = yield from _complete(short.record(drive), rules, short, f"probe {probe}")
         if isinstance(outcome, Fallen):
             return outcome
         volts, moved = (line_amplitudes(short.used(of), short.lines) for of in (outcome.drive, _acceleration(outcome)))

@@ -1,6 +1,8 @@
 """The engine: steps in, events out, and the output at zero whatever happens."""
 
 import itertools
+import threading
+import time
 from collections.abc import Callable, Generator
 from math import tau
 
@@ -30,12 +32,13 @@ from bench.engine.steps import (
 )
 from bench.events import Acquired, Event, LimitExceeded, OperatorAsked, State, StateChanged, StepStarted, Warned
 from bench.guard.limits import Limits
-from bench.testing.loopback import LoopbackRig
+from bench.testing.loopback import LoopbackBench, LoopbackRig
 from drivers.errors import ConnectionLost, DriveUnderflow
 from drivers.rig import Block, OperatorTask, RigError
 from sim.errors import Cause, RockbenchError
 from sim.specimen import Specimen
 from tests.bench.engine.bench import OMEGA, Bench
+from tests.patience import LONG
 
 COUPLED = Specimen().coupled(0.4)
 MOUNT = OperatorAction(OperatorTask.MOUNT_SPRING, COUPLED, "mount the spring")
@@ -503,3 +506,40 @@ def test_a_limit_that_cuts_opens_the_enable_line_without_a_ramp() -> None:
     assert cut.rig.played.size < ramped.rig.played.size
     assert sum(isinstance(event, LimitExceeded) for event in cut.events) == 1
     assert cut.states()[-2:] == [State.HALTED, State.CLOSED]
+
+
+class SlowToArm(LoopbackRig):
+    """Its amplifier takes time to be armed, and is not enabled after a cut."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.arming, self.enabled = threading.Event(), False
+
+    def arm(self) -> None:
+        self.arming.set()
+        for _ in range(500):
+            if self.halted:
+                raise RigError("the run cannot be prepared: the enable line was cut")
+            time.sleep(0.01)
+        self.enabled = True
+        super().arm()
+
+
+@pytest.mark.parametrize(("end", "status"), [("stop", "stopped"), ("abort", "aborted"), ("halt", "halted")])
+def test_a_request_while_the_rig_is_being_armed_enables_nothing(end: str, status: str) -> None:
+    rig = SlowToArm()
+    bench = LoopbackBench(rig)
+
+    def request() -> None:
+        rig.arming.wait(LONG)
+        getattr(bench.requests, end)("somebody is at the table")
+
+    thread = threading.Thread(target=request)
+    thread.start()
+    ending = bench.run_steps(Arm(0.5), RampOut())
+    thread.join()
+    assert (ending.status, ending.reason) == (status, "somebody is at the table")
+    assert rig.halted
+    assert not rig.enabled
+    assert rig.played.size == 0
+    assert bench.states() == [State.ARMED, State.HALTED, State.CLOSED]

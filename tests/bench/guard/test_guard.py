@@ -408,6 +408,14 @@ class TestTime:
         watch = TimeWatch(1000.0, self.LIMITS)
         assert not any(watch.check(7.0 + 0.1 * k * 1.0005, 100 * (k + 1)) for k in range(3000))
 
+    @pytest.mark.parametrize("ratio", [1.0005, 0.9995, 1.00003])
+    def test_an_allowed_difference_of_the_clocks_delays_no_block_however_long_the_run(self, ratio: float) -> None:
+        watch = TimeWatch(1000.0, self.LIMITS)
+        assert not any(watch.check(7.0 + 0.1 * k * ratio, 100 * (k + 1)) for k in range(30_000))
+        (found,) = watch.check(7.0 + 3000.0 * ratio + 0.6, 3_000_100)
+        assert found.quantity == "delay of a block of samples"
+        assert found.value == pytest.approx(0.6, abs=0.01)
+
     def test_a_late_block(self) -> None:
         watch = TimeWatch(1000.0, self.LIMITS)
         watch.check(7.0, 100)

@@ -13,7 +13,7 @@ from drivers.emulation.safety_chain import PulseRelay
 from drivers.errors import RigError
 from tests.drivers.daqmx.conftest import RATE, OpenSession
 from tests.drivers.daqmx.loopback import Loopback
-from tests.drivers.daqmx.runs import BLOCK, driving, started
+from tests.drivers.daqmx.runs import BLOCK, driving, is_safe, started
 from tests.drivers.daqmx.wired import Contacts, wired
 from tests.patience import eventually
 
@@ -107,3 +107,21 @@ def test_a_level_that_stands_still_opens_the_relay(level: bool) -> None:
     # it is told of the same level again and again
     relay.level(level)
     assert not relay.closed
+
+
+def test_a_relay_that_has_opened_is_not_closed_again_during_the_motion(
+    open_session: OpenSession, contacts: Contacts, plant: Loopback
+) -> None:
+    session = driving(open_session(heartbeat={"timeout": TIMEOUT}))
+    while not contacts.beats[-1]:
+        session.read(BLOCK)
+    session.read(BLOCK)
+    assert contacts.beats[-1] is False
+    rising = contacts.beats.count(True)
+    # the program is late, and the relay opens; there is drive enough for it
+    time.sleep(TIMEOUT + 0.1)
+    assert not contacts.relay.closed
+    with pytest.raises(RigError, match="the heartbeat relay has opened: its line had no rising edge for"):
+        session.read(BLOCK)
+    assert contacts.beats.count(True) == rising
+    eventually(lambda: is_safe(plant))

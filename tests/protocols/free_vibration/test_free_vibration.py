@@ -22,7 +22,7 @@ from bench.datafile.reader import open_datafile
 from bench.document.campaign import Campaign
 from bench.document.document import Picture, Table
 from bench.engine.interface import Requests, Unattended
-from bench.engine.steps import OperatorAction, Plan
+from bench.engine.steps import Arm, Done, OperatorAction, Plan
 from bench.events import Acquired, Event, OperatorAsked, StepStarted, Warned
 from bench.findings import FitFinished
 from bench.guard.limits import Limits
@@ -278,6 +278,18 @@ def test_a_spring_that_fails_does_not_leave_its_block_clamped(monkeypatch: pytes
     requests = [step.request for step in asked if isinstance(step, OperatorAction)]
     assert requests[-1].startswith("Remove the clamp, the spring and the block")
     assert "STILL CLAMPED" not in springs.result([]).text
+
+
+def test_a_storey_held_by_a_hand_need_not_be_as_still_as_one_at_rest() -> None:
+    armed: list[Arm] = []
+    plan = prepared(FreeVibrationParameters(excitation="hand"), bench()).plan()
+    step = next(plan)
+    while not armed:
+        armed += [step] if isinstance(step, Arm) else []
+        step = plan.send(Done())
+    plan.close()
+    assert armed[0].still >= 1e-3
+    assert armed[0].patience <= armed[0].rest
 
 
 def test_a_table_or_block_that_stays_clamped_is_told() -> None:

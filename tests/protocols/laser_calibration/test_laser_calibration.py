@@ -1,6 +1,7 @@
 """The laser calibration: against errors that are known exactly, applied to signals, kept, aged, refused."""
 
 import json
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -20,7 +21,14 @@ from bench.datafile.reader import open_datafile
 from bench.engine.steps import AcquireAtRest, Done, OperatorAction, RestSamples
 from drivers.rig import Channel, OperatorTask
 from protocols.common.calibrate import Unmeasurable
-from protocols.laser_calibration.fit import Pass, calibration, fit_curve
+from protocols.laser_calibration.fit import (
+    ErrorCurve,
+    Pass,
+    calibration,
+    disagreements,
+    fit_curve,
+    require_agreement,
+)
 from protocols.laser_calibration.protocol import LaserCalibrationParameters
 from sim.channel import STOREYS
 from sim.errors import InvalidInput
@@ -76,6 +84,46 @@ def left(one: LaserCalibration, laser: int, places: np.ndarray) -> np.ndarray:
     corrected = one.lasers[laser].corrected(places + error(laser, places))
     at_rest = one.lasers[laser].corrected(np.array([RESTS[laser]]) + error(laser, np.array([RESTS[laser]])))
     return corrected - at_rest - (places - RESTS[laser])
+
+
+def curves_of(scale: float) -> tuple[list[Pass], tuple[ErrorCurve, ErrorCurve], tuple[float, float]]:
+    """Passes and curves with a laser 2 that shows `scale` times as much."""
+    random = np.random.default_rng(3)
+    passes = [made_pass(4.0 if k < 4 else 8.0, 0.05 * (1.0 - 0.01 * k), random, 3e-6) for k in range(8)]
+    passes = [replace(each, lasers=(each.lasers[0], scale * each.lasers[1])) for each in passes]
+    rests = RESTS[0] + float(error(0, np.array(RESTS[0]))), scale * (RESTS[1] + float(error(1, np.array(RESTS[1]))))
+    return passes, (fit_curve(passes, 0, rests[0]), fit_curve(passes, 1, rests[1])), rests
+
+
+def test_lasers_that_disagree_are_told_and_leave_their_difference_to_the_scale() -> None:
+    configuration = BenchConfiguration()
+    stated: list[float] = []
+    for scale, count in ((1.0, 0), (1.02, 1)):
+        passes, curves, rests = curves_of(scale)
+        require_agreement(curves)
+        one = calibration(
+            passes, curves, rests, ("A", "B"), SensorAccuracy(), (RANGE, RANGE), reference_linearity=5e-4,
+            valid_days=30.0, date=datetime(2026, 5, 4, 12, tzinfo=UTC),
+        )  # fmt: skip
+        remarks = [each for each in disagreements(one, curves, configuration) if "two lasers" in each]
+        assert len(remarks) == count
+        stated.append(one.table_uncertainty)
+    # one per cent of error of the mean, with k = 2
+    assert 0.01 < 2.0 * stated[1] < 0.03
+    assert stated[0] < 0.002
+
+
+@pytest.mark.parametrize("scale", [0.0, 1.06, -1.0])
+def test_a_laser_that_does_not_follow_the_table_is_not_calibrated(scale: float) -> None:
+    """Aimed at a fixed part, on a wrong range, or inverted."""
+    passes, curves, _ = curves_of(1.0)
+    noise = np.random.default_rng(4)
+    passes = [
+        replace(each, lasers=(each.lasers[0], scale * each.lasers[1] + 3e-6 * noise.standard_normal(PHASES.size)))
+        for each in passes
+    ]
+    with pytest.raises((Unmeasurable, InvalidInput)):
+        require_agreement((curves[0], fit_curve(passes, 1, 0.0)))
 
 
 @pytest.mark.parametrize("noise", [0.0, 3e-6])
@@ -282,3 +330,21 @@ def test_a_calibration_on_the_simulated_bench_agrees_with_its_lasers_and_serves_
     assert main(["run", "identify", "--config", str(bench), "--dry-run", "--json"]) == 0
     (said,) = json.loads(capsys.readouterr().out)["warnings"]
     assert "the laser calibration of 2020-01-01 expired on 2020-12-31" in said
+
+
+def test_storeys_that_stay_clamped_are_told() -> None:
+    check = load_protocol("check")
+    for protocol in (PROTOCOL, check):
+        prepared = protocol.prepare(protocol.parameters(), BenchConfiguration(), None)
+        plan = prepared.plan()
+        step = next(plan)
+        while not (isinstance(step, OperatorAction) and step.work is OperatorTask.LOCK_FRAME):
+            step = plan.send(Done())
+        plan.send(Done())
+        plan.close()
+        assert "THE STOREYS ARE STILL CLAMPED" in prepared.result([]).text
+        # a request that was not confirmed clamps nothing
+        declined = protocol.prepare(protocol.parameters(), BenchConfiguration(), None)
+        next(plan := declined.plan())
+        plan.close()
+        assert "CLAMPED" not in declined.result([]).text

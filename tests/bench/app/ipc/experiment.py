@@ -1,5 +1,6 @@
 """A short experiment on the small bench of the fault tests, made anew in the session's process."""
 
+import time
 from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
@@ -30,6 +31,7 @@ class ShakingParameters(Parameters):
 
     cycles: int = quantity(CYCLES, "1", "cycles of the sine", ge=1, le=10_000)
     gossip: int = quantity(0, "1", "events that are told between two cycles", ge=0)
+    drawing: float = quantity(0.0, "s", "time that the figure takes", ge=0)
     amplitude: float = quantity(AMPLITUDE, "m/s2", "amplitude of the table acceleration", gt=0, le=2)
 
 
@@ -64,6 +66,8 @@ class Shaking(Prepared[ShakingParameters]):
 
     def result(self, points: Sequence[Parameters]) -> Result:
         def draw(path: Path) -> None:
+            for _ in range(round(self.parameters.drawing / 0.01)):
+                time.sleep(0.01)
             path.write_text(f"{len(points)} of {len(self.prediction)}", encoding="utf-8")
 
         return Result(tuple(points), f"{len(points)} points", {"none.png": draw})

@@ -207,6 +207,16 @@ def test_an_abort_can_be_asked_for_and_beats_tell_the_state(tmp_path: Path) -> N
     assert (ended.status, ended.reason) == ("aborted", "abort requested")
 
 
+def test_a_run_that_has_ended_is_not_refused_when_its_figures_are_broken_off(tmp_path: Path) -> None:
+    client = Client(begun(tmp_path, cycles=1, drawing=LONG))
+    client.until(lambda: any(isinstance(m, Preparing) and m.phase == "drawing the figures" for m in client.heard))
+    client.link.ask("halt")
+    ended = client.until_over()
+    assert isinstance(ended, Ended)
+    assert (ended.status, ended.reason) == ("completed", "the plan was carried out")
+    assert not (tmp_path / "none.png").exists()
+
+
 def test_a_question_takes_only_its_own_answer(tmp_path: Path) -> None:
     client = Client(begun(tmp_path, person=True))
     client.until(client.question)

@@ -18,6 +18,7 @@ import pytest
 from bench.app.ipc.announcement import announced
 from bench.app.ipc.messages import TRACES, Ended, Opened, Published, Question, Traces
 from bench.app.ipc.server import FAREWELL, SessionServer
+from bench.app.watch.feed import Feed
 from bench.app.watch.server import POLICY
 from bench.app.watch.serving import LivePage
 from bench.engine.interface import Requests
@@ -273,3 +274,22 @@ def test_ten_browsers_receive_the_same_changes_and_leave(served: Served, tmp_pat
             changed = heard(stream, lambda found: "log" in found)
             assert changed["log"][-1][2] == "one line"
             assert "figure" not in changed, "what has not changed is not sent"
+
+
+def test_a_reader_after_a_pause_receives_the_present_document() -> None:
+    """Without readers it is not kept up to date."""
+    feed = Feed()
+    feed.publish({"head": "yesterday"})
+    assert not feed.has_readers
+
+    def update() -> None:
+        eventually(lambda: feed.has_readers)
+        feed.publish({"head": "now"})
+
+    thread = Thread(target=update)
+    thread.start()
+    assert json.loads(feed.since(0, LONG)[1]) == {"head": "now"}
+    thread.join()
+    # without a change as well, as for a bench at rest
+    assert feed.has_readers
+    assert json.loads(feed.since(0, LONG)[1]) == {"head": "now"}
