@@ -286,21 +286,17 @@ class BenchConfiguration(Parameters):
         block, watchdog = self.acquisition.block_duration, self.hardware.daq.watchdog
         if self.backend != "hardware":
             return self
-        # the loop may be late by the lead, and waits for late values of a laser as long
-        lead = min(self.acquisition.lead, self.limits.late)
-        least = max(_BLOCKS_OF_WATCHDOG * block, block + lead)
-        if watchdog is not None and watchdog < least:
+        if watchdog is not None and watchdog < _BLOCKS_OF_WATCHDOG * block:
             allowed = (
-                f"the watchdog is reset once per block of {block:g} s, and the loop may be late by the lead of "
-                f"{lead:g} s: set a time-out of {least:g} s or more"
+                f"the watchdog is reset once per block of {block:g} s: set a time-out of {_BLOCKS_OF_WATCHDOG} blocks "
+                "or more"
             )
             raise InvalidInput("hardware.daq.watchdog", watchdog, allowed)
         heartbeat = self.hardware.daq.heartbeat
-        least = max(_BLOCKS_OF_HEARTBEAT * block, 2.0 * block + lead)
-        if heartbeat is not None and heartbeat.timeout < least:
+        if heartbeat is not None and heartbeat.timeout < _BLOCKS_OF_HEARTBEAT * block:
             allowed = (
-                f"the heartbeat has one rising edge in two blocks of {block:g} s, and the loop may be late by the lead "
-                f"of {lead:g} s: set a time-out of {least:g} s or more"
+                f"the heartbeat has one rising edge in two blocks, and a block lasts {block:g} s: set a time-out of "
+                f"{_BLOCKS_OF_HEARTBEAT} blocks or more"
             )
             raise InvalidInput("hardware.daq.heartbeat.timeout", heartbeat.timeout, allowed)
         if self.hardware.lasers.connection == "serial" and block < _SHORTEST_WITH_SERIAL_LASERS:

@@ -80,6 +80,7 @@ def review(configuration: BenchConfiguration) -> Review:
             remedy = f'{why}; lower it, or name it in limits.confirmed = ["{reach.limit}"]'
             refusals.append(InvalidInput(f"limits.{reach.limit}", value, remedy))
     refusals += _contradictions(configuration)
+    refusals += _time_outs(configuration)
     known = tuple(f"limits.{name} = " for name in confirmed)
     notices += (notice for notice in _unusual(configuration) if not notice.startswith(known))
     return Review(tuple(refusals), tuple(notices))
@@ -202,6 +203,26 @@ def _contradictions(configuration: BenchConfiguration) -> Iterator[InvalidInput]
                 f"simulation.bench.shaker.moving_mass = {shaker.moving_mass:g})"
             )
             yield InvalidInput("specimen.frame.m1", specimen.frame.m1, allowed)
+
+
+def _time_outs(configuration: BenchConfiguration) -> Iterator[InvalidInput]:
+    """Refusals of time-outs that are shorter than the lead, by which the loop may be late without consequence: it also
+    waits for late values of a laser as long, and the enable chain would open at full drive.
+    """
+    if configuration.backend != "hardware":
+        return
+    daq, block = configuration.hardware.daq, configuration.acquisition.block_duration
+    lead = min(configuration.acquisition.lead, configuration.limits.late)
+    found = [("watchdog", daq.watchdog, block + lead, "a block")]
+    if daq.heartbeat is not None:
+        found.append(("heartbeat.timeout", daq.heartbeat.timeout, 2.0 * block + lead, "two blocks"))
+    for key, value, least, blocks in found:
+        if value is not None and value < least:
+            allowed = (
+                f"the program may be late by acquisition.lead = {lead:g} s: set a time-out of at least {blocks} and "
+                f"the lead, {least:.3g} s, or a shorter lead"
+            )
+            yield InvalidInput(f"hardware.daq.{key}", value, allowed)
 
 
 def _waits(configuration: BenchConfiguration) -> dict[str, tuple[float, float, str]]:

@@ -265,7 +265,7 @@ def test_a_configuration_as_text_reads_back_as_the_same(file: Callable[[str], Pa
     [
         (
             "[acquisition]\nblock_duration = 0.2\n[hardware.daq]\nwatchdog = 0.5",
-            r"hardware\.daq\.watchdog = 0\.5 .* set a time-out of 0\.6 s or more",
+            r"hardware\.daq\.watchdog = 0\.5 .* 3 blocks",
         ),
         ("[acquisition]\nblock_duration = 0.01", r"acquisition\.block_duration = 0\.01 .* analogue"),
     ],

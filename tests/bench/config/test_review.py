@@ -215,3 +215,19 @@ def test_a_plan_states_its_frequencies_in_hertz_beside_the_modes() -> None:
 def test_a_prediction_warns_and_goes_on(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["predict", "modes", "--beta", "25", "--json"]) == 0
     assert "warning: beta[0] = 25 is above the usual range, 0.02 to 5" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("key", ["watchdog", "heartbeat.timeout"])
+def test_time_outs_of_the_enable_chain_outlast_a_loop_that_is_late_by_the_lead(key: str) -> None:
+    def refused(value: float, lead: float) -> list[str]:
+        heartbeat = {"heartbeat": {"timeout": value}} if key != "watchdog" else {"watchdog": value}
+        content = {"backend": "hardware", "acquisition": {"lead": lead}, "hardware": {"daq": heartbeat}}
+        found = review(BenchConfiguration.model_validate(content)).refusals
+        return [str(each) for each in found if f"hardware.daq.{key} = " in str(each)]
+
+    least = 0.6 if key == "watchdog" else 0.7
+    (said,) = refused(least - 0.05, 0.5)
+    assert f"at least {'a block' if key == 'watchdog' else 'two blocks'} and the lead, {least:g} s" in said
+    assert refused(least + 0.05, 0.5) == []
+    # a block that is later than limits.late ends the run
+    assert refused(least + 0.05, 3.0) == []
