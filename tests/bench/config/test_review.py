@@ -230,4 +230,4 @@ def test_time_outs_of_the_enable_chain_outlast_a_loop_that_is_late_by_the_lead(k
     assert f"at least {'a block' if key == 'watchdog' else 'two blocks'} and the lead, {least:g} s" in said
     assert refused(least + 0.05, 0.5) == []
     # a block that is later than limits.late ends the run
-    assert refused(least + 0.05, 3.0) == []
+    assert refused(least + 0.05, 2.0) == []
