@@ -53,7 +53,7 @@ def lasers() -> list[WiredFault]:
     borne = partial(fault, status="completed", says="", must=never)
     return [
         fault("laser unplugged", _does(EmulatedLaser.unplug), "failed", "laser_1", on),
-        fault("both lasers unplugged", _does(EmulatedLaser.unplug, 1, 2), "failed", "laser_1", on),
+        fault("both lasers unplugged", _does(EmulatedLaser.unplug, 1, 2), "failed", "laser_", on),
         invalid("laser silent", _does(lambda laser: laser.silence(LONG))),
         invalid("both lasers silent", _does(lambda laser: laser.silence(LONG), 1, 2)),
         borne("laser silent a moment", _does(lambda laser: laser.silence(0.03), 2)),
