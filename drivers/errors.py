@@ -63,6 +63,15 @@ class SafetyInputOpen(RigError):
         return Cause(self.error_code, ", ".join(self.inputs))
 
 
+class EnableLineCut(RigError):
+    """Arming is refused because the enable line was cut meanwhile. Further errors may be appended to the text."""
+
+    text = "the run cannot be prepared: the enable line was cut during the preparation"
+
+    def __init__(self) -> None:
+        super().__init__(self.text)
+
+
 class BackendFault(RigError):
     """The rig backend `backend` returned an invalid value, or raised an exception that a rig must not raise."""
 

@@ -212,17 +212,22 @@ def _time_outs(configuration: BenchConfiguration) -> Iterator[InvalidInput]:
     if configuration.backend != "hardware":
         return
     daq, block = configuration.hardware.daq, configuration.acquisition.block_duration
-    lead = min(configuration.acquisition.lead, configuration.limits.late)
-    found = [("watchdog", daq.watchdog, block + lead, "a block")]
+    key, lead = min(
+        (("acquisition.lead", configuration.acquisition.lead), ("limits.late", configuration.limits.late)),
+        key=lambda each: each[1],
+    )
+    late = f"the program may be late by {key} = {lead:g} s"
+    # the watchdog is reset after a quarter of its time-out at the earliest
+    found = [("watchdog", daq.watchdog, (block + lead) * 4.0 / 3.0, "four thirds of a block and this time")]
     if daq.heartbeat is not None:
-        found.append(("heartbeat.timeout", daq.heartbeat.timeout, 2.0 * block + lead, "two blocks"))
-    for key, value, least, blocks in found:
+        found.append(("heartbeat.timeout", daq.heartbeat.timeout, 2.0 * block + lead, "two blocks and this time"))
+    for name, value, least, blocks in found:
         if value is not None and value < least:
-            allowed = (
-                f"the program may be late by acquisition.lead = {lead:g} s: set a time-out of at least {blocks} and "
-                f"the lead, {least:.3g} s, or a shorter lead"
+            yield InvalidInput(
+                f"hardware.daq.{name}",
+                value,
+                f"{late}: set a time-out of at least {blocks}, {least:.3g} s, or reduce {key}",
             )
-            yield InvalidInput(f"hardware.daq.{key}", value, allowed)
 
 
 def _waits(configuration: BenchConfiguration) -> dict[str, tuple[float, float, str]]:

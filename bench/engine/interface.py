@@ -93,6 +93,10 @@ class Requests:
         self._halt: _Made | None = None
         self._cut: Callable[[], None] | None = None
         self._arming = False
+        self.cuts_while_arming = True
+        """Whether a stop or an abort during the arming cuts the enable line; False in replays of older files, where
+        they began a ramp after the arming.
+        """
         self.interrupted = False
         """Whether an operating-system signal caused the request: the session then exits as soon as the rig is at rest.
         """
@@ -148,19 +152,24 @@ class Requests:
     def stop(self, why: str = "stop requested", code: CauseCode = CauseCode.REQUEST) -> None:
         """Request a smooth ramp to zero; the measurement remains valid. The first `why` is recorded as the reason."""
         self._stop = self._stop or (why, Cause(code, "stop"))
-        if self._arming:
+        if self._arming and self.cuts_while_arming:
             self._cut_now()
 
     def abort(self, why: str = "abort requested", code: CauseCode = CauseCode.REQUEST) -> None:
         """Request a fast ramp to zero; the run becomes invalid."""
         self._abort = self._abort or (why, Cause(code, "abort"))
-        if self._arming:
+        if self._arming and self.cuts_while_arming:
             self._cut_now()
 
     def halt(self, why: str = "halt requested", code: CauseCode = CauseCode.REQUEST) -> None:
         """Cut the enable line now, in this thread; the loop then finds the rig halted and ends."""
         self._halt = self._halt or (why, Cause(code, "halt"))
         self._cut_now()
+
+    @property
+    def forbids_arming(self) -> bool:
+        """Whether a request has been made that ends the arming of the rig."""
+        return self._halt is not None or (self.cuts_while_arming and self.strongest is not None)
 
     def _cut_now(self) -> None:
         if self._cut is not None:

@@ -34,6 +34,7 @@ from bench.events import LimitExceeded, State, Warned
 from bench.guard.guard import Exchange, Guard
 from bench.guard.limits import Violation, amount
 from bench.plugins import plugin_code
+from drivers.errors import EnableLineCut
 from drivers.rig import Alignment, Counts, Rig, RigError
 from sim.errors import UNKNOWN, Cause, CauseCode, InvalidInput, RockbenchError
 from sim.specimen import Specimen
@@ -63,19 +64,21 @@ class Loop:
         """
         self._over = self._runaway = None
         self.check_requests()
+        failed: RigError | None = None
         try:
             with self._requests.arming():
-                if self._requests.strongest is None:
+                if not self._requests.forbids_arming:
                     self.output.arm(reason)
-        except RigError:
-            # a rig whose enable line was cut refuses to be armed
-            if self._requests.strongest is None:
+        except RigError as error:
+            if not self._requests.forbids_arming:
                 raise
-        if not self.output.driven:
-            self.check_requests()
-        if self._requests.strongest is not None:
-            status = _STATUS[self._requests.strongest]
-            raise Ended(self.output.cut(Ending(status, self._requests.reason, self._requests.cause)))
+            # a rig whose enable line was cut refuses to be armed; any other error is told too
+            failed = None if str(error) == EnableLineCut.text else error
+        asked = self._requests.strongest
+        if asked is not None and self._requests.forbids_arming and self.output.driven:
+            ending = Ending(_STATUS[asked], self._requests.reason, self._requests.cause)
+            raise Ended(self.output.cut(ending if failed is None else ending.then(Ending.failed(failed))))
+        self.check_requests()
 
     def exchange(self) -> Exchange:
         """Run one iteration: exchange a block, publish its warnings, check its limits and the requests."""

@@ -35,13 +35,16 @@ class Entry:
 
 @dataclass(frozen=True)
 class _Request:
-    """Request to end the run, with the numbers of blocks and of journal entries before it."""
+    """Request to end the run, with the numbers of blocks and of journal entries before it; it may have `halted` the
+    bench.
+    """
 
     blocks: int
     entries: int
     kind: str
     reason: str
     code: CauseCode
+    halted: bool
 
 
 class RecordedCourse:
@@ -138,7 +141,8 @@ class RecordedCourse:
             if columns.get("code") in _REQUESTS:
                 # errors during the ramp-down are appended to the reason of the request
                 reason = columns["reason"].partition("; then ")[0]
-                yield _Request(entry.blocks, index, columns["subject"], reason, CauseCode(columns["code"]))
+                halted = columns.get("after") == State.HALTED
+                yield _Request(entry.blocks, index, columns["subject"], reason, CauseCode(columns["code"]), halted)
 
     def _entries(self) -> list[Entry]:
         waiting = {kind: deque(rows) for kind, rows in self._rows.items()}

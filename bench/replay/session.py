@@ -70,6 +70,7 @@ class RequestReplay:
             if self._blocks < request.blocks or self._entries < request.entries:
                 return
             self._waiting.popleft()
+            self._requests.cuts_while_arming = request.halted
             make = {"stop": self._requests.stop, "abort": self._requests.abort, "halt": self._requests.halt}
             make[request.kind](request.reason, request.code)
 

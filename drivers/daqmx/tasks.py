@@ -18,7 +18,7 @@ from drivers.daqmx.safety import (
     SafetyInputs,
     Watchdog,
 )
-from drivers.errors import RigError, SafetyInputOpen
+from drivers.errors import EnableLineCut, RigError, SafetyInputOpen
 from drivers.timebase.marking import Pulses
 from sim.errors import InvalidInput
 
@@ -231,7 +231,7 @@ def _connected(given: AnalogInput, used: Sequence[FoundDevice]) -> Connected:
 
 def _require_not_cut(is_cut: Callable[[], bool]) -> None:
     if is_cut():
-        raise RigError("the run cannot be prepared: the enable line was cut during the preparation")
+        raise EnableLineCut
 
 
 def _quietly(step: Callable[[], None]) -> None:

@@ -1,7 +1,7 @@
 """Identification of the frame from the signals of one or several decays."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -91,7 +91,10 @@ def released_decay(signals: Array, setting: Setting) -> Decay:
         raise Unusable(
             f"the storey was released {max(left, 0.0):.1f} s before the end of the recording: release it earlier"
         )
-    return _decay(stretch.from_time(begin), setting, 0.0, begin)
+    found = _decay(stretch.from_time(begin), setting, 0.0, begin)
+    # from rest, which the zero of a storey held by hand is not
+    moved = found.fit.stretch.readings - found.fit.values[OFFSETS][:, None]
+    return replace(found, peak=_largest_drift(moved))
 
 
 def _decay(stretch: Stretch, setting: Setting, quiet: float, begin: float) -> Decay:
@@ -99,8 +102,6 @@ def _decay(stretch: Stretch, setting: Setting, quiet: float, begin: float) -> De
     _require_decay(fit)
     errors = Errors(setting.sensors, quiet, setting.masses_covariance)
     found = quantities(fit.constants)
-    # relative to rest, which the zero of a storey held by hand is not
-    moved = stretch.readings - fit.values[OFFSETS][:, None]
     ratios, omegas = found[XI1 : XI1 + 2], found[OMEGA1 : OMEGA1 + 2]
     return Decay(
         quantities=found,
@@ -108,8 +109,12 @@ def _decay(stretch: Stretch, setting: Setting, quiet: float, begin: float) -> De
         fit=fit,
         courses=damping_courses(fit, errors, begin, ratios, omegas),
         begin=begin,
-        peak=float(np.nanmax(np.abs(moved[1] - moved[0]))),
+        peak=_largest_drift(stretch.readings),
     )
+
+
+def _largest_drift(readings: Array) -> float:
+    return float(np.nanmax(np.abs(readings[1] - readings[0])))
 
 
 def _require_decay(fit: Fit) -> None:

@@ -33,7 +33,7 @@ from bench.engine.steps import (
 from bench.events import Acquired, Event, LimitExceeded, OperatorAsked, State, StateChanged, StepStarted, Warned
 from bench.guard.limits import Limits
 from bench.testing.loopback import LoopbackBench, LoopbackRig
-from drivers.errors import ConnectionLost, DriveUnderflow
+from drivers.errors import ConnectionLost, DriveUnderflow, EnableLineCut
 from drivers.rig import Block, OperatorTask, RigError
 from sim.errors import Cause, RockbenchError
 from sim.specimen import Specimen
@@ -519,7 +519,7 @@ class SlowToArm(LoopbackRig):
         self.arming.set()
         for _ in range(500):
             if self.halted:
-                raise RigError("the run cannot be prepared: the enable line was cut")
+                raise EnableLineCut
             time.sleep(0.01)
         self.enabled = True
         super().arm()
@@ -543,3 +543,15 @@ def test_a_request_while_the_rig_is_being_armed_enables_nothing(end: str, status
     assert not rig.enabled
     assert rig.played.size == 0
     assert bench.states() == [State.ARMED, State.HALTED, State.CLOSED]
+
+
+def test_an_error_while_the_rig_is_being_armed_is_told_beside_a_request() -> None:
+    class Unreachable(LoopbackRig):
+        def arm(self) -> None:
+            bench.requests.stop("somebody is waiting")
+            raise RigError("the output could not be set: no network")
+
+    bench = LoopbackBench(Unreachable())
+    ending = bench.run_steps(Arm(0.5), RampOut())
+    assert ending.status == "failed"
+    assert ending.reason == "somebody is waiting; then the output could not be set: no network"
