@@ -107,8 +107,7 @@ class Replayed:
     contain; the replay makes abort requests in their place. `played` of `rows` samples were requested. `same_wording`
     is False for a file with other message texts, and `same_intervals` for one with another evaluation of uncertainties;
     texts or uncertainties are then not compared. `beyond` states what the plan requested after the end of a complete
-    recording, or is None. `returned` is the result of the plan, or None if the plan did not end
-    by itself.
+    recording, or is None. `returned` is the result of the plan, or None if the plan did not end by itself.
     """
 
     status: str

@@ -191,10 +191,9 @@ def calibration(
     ]
     span = _span(curves)
     ratios = np.array([each.ratio for each in passes])
-    sizes = [_span_uncertainty(span, accuracy, whole) for whole in ranges]
-    standard = np.sqrt(np.mean(np.square(sizes)) / 2.0)
+    apart = _difference_uncertainty(curves, accuracy, ranges)
     # two standards that disagree by more than they should leave half of the excess to their mean
-    excess = 0.5 * sqrt(max((slopes[1] - slopes[0]) ** 2 - float(np.sum(np.square(COVERAGE * np.array(sizes)))), 0.0))
+    excess = 0.5 * sqrt(max((slopes[1] - slopes[0]) ** 2 - (COVERAGE * apart) ** 2, 0.0))
     scatter = np.hypot(np.std(ratios, ddof=1) / sqrt(len(passes)), jackknife((curves[0].slopes + curves[1].slopes) / 2))
     # an error of the curves also changes their slopes
     bent = np.hypot(curves[0].uncertainty, curves[1].uncertainty) / (0.5 * span)
@@ -208,7 +207,7 @@ def calibration(
         common_linearity=reference_linearity * span,
         table_displacement=factor,
         table_acceleration=factor * float(ratios.mean()),
-        table_uncertainty=float(np.hypot(np.hypot(standard, excess), scatter)),
+        table_uncertainty=hypot(0.5 * apart, excess, scatter),
     )
 
 
@@ -235,17 +234,16 @@ def disagreements(
     found: LaserCalibration, curves: tuple[ErrorCurve, ErrorCurve], configuration: BenchConfiguration
 ) -> list[str]:
     """Remarks on sensors whose scales differ by more than `IMPLAUSIBLE` times the uncertainty of their difference."""
-    accuracy, span = configuration.analysis, _span(curves)
-    sizes = [_span_uncertainty(span, accuracy, whole) for whole in configuration.laser_ranges]
+    accuracy = configuration.analysis
+    apart = _difference_uncertainty(curves, accuracy, configuration.laser_ranges)
     lasers, remarks = curves[1].slope - curves[0].slope, list[str]()
-    if abs(lasers) > (bound := IMPLAUSIBLE * hypot(*sizes)):
+    if abs(lasers) > (bound := IMPLAUSIBLE * apart):
         remarks.append(
             f"the spans of the two lasers differ by {100.0 * lasers:+.2f} %, more than their data sheets allow "
             f"({100.0 * bound:.2f} %): check their ranges and the load resistors of analogue outputs; the uncertainty "
             "of the table's scale contains the difference"
         )
-    standard = float(np.sqrt(np.mean(np.square(sizes)) / 2.0))
-    bound = IMPLAUSIBLE * hypot(standard, accuracy.table_scale)
+    bound = IMPLAUSIBLE * hypot(0.5 * apart, accuracy.table_scale)
     for name, factor in (("displacement", found.table_displacement), ("acceleration", found.table_acceleration)):
         if abs(factor - 1.0) > bound:
             remarks.append(
@@ -253,6 +251,15 @@ def disagreements(
                 f"more than the data sheets allow ({100.0 * bound:.2f} %): check its sensitivity in the configuration"
             )
     return remarks
+
+
+def _difference_uncertainty(
+    curves: tuple[ErrorCurve, ErrorCurve], accuracy: SensorAccuracy, ranges: tuple[float, float]
+) -> float:
+    """Relative standard uncertainty of the difference between the spans of the two lasers, from their data sheets; that
+    of the mean of both is half of it.
+    """
+    return hypot(*(_span_uncertainty(_span(curves), accuracy, whole) for whole in ranges))
 
 
 def _span(curves: tuple[ErrorCurve, ErrorCurve]) -> float:

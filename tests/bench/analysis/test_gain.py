@@ -2,7 +2,6 @@
 
 import json
 from dataclasses import replace
-from datetime import UTC, datetime
 
 import numpy as np
 import pytest
@@ -11,13 +10,14 @@ from hypothesis import strategies as st
 
 from bench.analysis.cycles import Cycle, fit_cycle
 from bench.analysis.gain import DRAWS, SEED, SensorAccuracy, SteadyPeak, gain, steady_peak
-from bench.analysis.laser_calibration import LaserCalibration, LaserCurve
+from bench.analysis.laser_calibration import LaserCalibration
 from bench.analysis.linearity import LinearFrame
 from bench.analysis.running_gain import shared_draws
 from bench.analysis.sensor_accuracy import SCALES, Draws, PeakReadings, SensorUncertainty
 from bench.analysis.signals import ACCELERATION, DRIFT, LASER_2
 from bench.analysis.unsteady_peaks import unsteady_peaks
 from sim.specimen import Specimen
+from tests.bench.calibrated import calibration
 from tests.made_cycles import pure_cycle
 
 EXACT = SensorAccuracy(laser_mismatch=0.0, laser_resolution=0.0, laser_timing=0.0, laser_linearity=0.0, table_scale=0.0)
@@ -149,29 +149,7 @@ def test_the_steps_of_a_laser_move_a_fitted_peak_about_as_far_as_stated(amplitud
 
 
 def _calibrated() -> LaserCalibration:
-    curve = LaserCurve(
-        sensor="",
-        lowest=-0.05,
-        highest=0.03,
-        rest=0.004,
-        error=(0.0, 1e-5),
-        uncertainty=3e-6,
-        scale=1.0,
-        delay=0.0,
-        delay_uncertainty=0.0,
-    )
-    return LaserCalibration(
-        date=datetime(2020, 1, 1, tzinfo=UTC),
-        valid_days=1000.0,
-        laser_1=curve,
-        laser_2=curve,
-        table_displacement=1.0,
-        table_acceleration=1.0,
-        table_uncertainty=1e-3,
-        differential_uncertainty=1e-4,
-        common_linearity=1e-5,
-        differential_scale=1.0,
-    )
+    return calibration(-0.05, 0.03, rest=0.004, uncertainty=3e-6, common_linearity=1e-5)
 
 
 def _reading(drift: float, sign: float, laser_1: float) -> PeakReadings:
