@@ -29,6 +29,7 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "harmonic": ("run", "harmonic", "--omega", "16", "--beta", "0.4"),
     "identify": ("run", "identify"),
     "laser-calibration": ("run", "laser-calibration"),
+    "stability": ("run", "stability", "--omega", "15", "--beta", "0.97"),
 }
 """Arguments of `rockbench`, by protocol."""
 

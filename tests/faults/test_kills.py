@@ -1,11 +1,17 @@
 """A program that is killed while it records, in real time: at most a second is lost, and the restored file replays."""
 
 import os
+from importlib.metadata import entry_points
 from pathlib import Path
 
 import pytest
 
 from tests.faults.kills import COMMANDS, kill
+
+
+def test_every_protocol_is_killed() -> None:
+    ours = {each.name for each in entry_points(group="rockbench.protocols") if each.value.startswith("protocols.")}
+    assert set(COMMANDS) == ours
 
 
 @pytest.mark.soak
