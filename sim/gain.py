@@ -5,8 +5,9 @@ can coexist, so that a prediction has up to two branches; the start of a test de
 Under a record, the peaks are those of the motion that starts at rest, unless the block overturns.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import hypot, log
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,6 +75,18 @@ class SeismicGain:
     alpha_2: float | None
     bare: Peaks
     motion: Motion
+
+
+def nearest_branch(branches: Mapping[str, Branch], drift: float, u1: float) -> str | None:
+    """Name of the branch whose peaks of drift and u1 [m] are closest to the given ones on a logarithmic scale; None
+    without a branch.
+    """
+
+    def distance(name: str) -> float:
+        expected = branches[name].orbit.peaks
+        return hypot(log(drift / expected.drift), log(u1 / expected.u1))
+
+    return min(branches, key=distance, default=None)
 
 
 def predict_gain(

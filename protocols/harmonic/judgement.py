@@ -12,7 +12,7 @@ from bench.analysis.uncertainty import plus_minus
 from bench.prediction.bands import expanded_uncertainty
 from protocols.common.sine.settling import Held, Settled
 from protocols.harmonic.protocol import HarmonicPoint, PointStatus
-from sim.gain import Branch, predict_gain
+from sim.gain import Branch, nearest_branch, predict_gain
 from sim.knowledge import SpecimenKnowledge
 from sim.shaker import Shaker
 from sim.specimen import Specimen
@@ -123,7 +123,7 @@ def judge(settled: Settled, conditions: Conditions, starts: int, held: Held | No
     peak, bare, shaker = settled.peak, conditions.reference.peak, conditions.shaker
     branches = conditions.branches(peak)
     steady = settled.steadiness.steady
-    name = _nearest(branches, peak) if steady else _ROCKING
+    name = (nearest_branch(branches, peak.drift, peak.u1) if steady else None) or _ROCKING
     status = (PointStatus.STEADY if name == _ROCKING else PointStatus.RESTING) if steady else PointStatus.MODULATED
     comparison = conditions.comparison(name, branches.get(name), peak)
     # an unsteady motion has the gain at the amplitude that occurred, which no branch describes
@@ -166,7 +166,7 @@ def _held_point(free: HarmonicPoint, held: Held, conditions: Conditions) -> Harm
         text = f"{released if held.cycles else 'the motion could not be held on its orbit'}: {held.reason}"
         return _remarked(free, text)
     branches = conditions.branches(peak)
-    if _nearest(branches, peak) != _ROCKING or _ROCKING not in branches:
+    if nearest_branch(branches, peak.drift, peak.u1) != _ROCKING:
         return _remarked(free, "the held motion is not on the rocking orbit")
     comparison = conditions.comparison(_ROCKING, branches[_ROCKING], peak)
     measured, agrees = comparison.compare(peak)
@@ -232,16 +232,6 @@ def predicted_fields(name: str, branch: Branch | None, known: SpecimenKnowledge)
         "alpha_2_predicted_uncertainty": expanded_uncertainty(branch, known) if branch else None,
         "predicted_stable": branch.stable if branch else None,
     }
-
-
-def _nearest(branches: dict[str, Branch], peak: SteadyPeak) -> str:
-    """The branch whose peaks of drift and u1 are closest to the measured peaks on a logarithmic scale."""
-
-    def distance(name: str) -> float:
-        expected = branches[name].orbit.peaks
-        return hypot(log(peak.drift / expected.drift), log(peak.u1 / expected.u1))
-
-    return min(branches, key=distance, default=_ROCKING)
 
 
 def _described(settled: Settled) -> str:

@@ -29,9 +29,10 @@ from protocols.common.sine.holding import Hold, capture_and_measure, prepared
 from protocols.common.sine.pace import Pace
 from protocols.common.sine.settling import Held, Report, Settled, settle_and_measure
 from protocols.stability.laws import LawPrediction, implied, law_prediction, predicted_columns
-from protocols.stability.prediction import Predicted, close_pair, predicted, rocking
+from protocols.stability.prediction import Predicted, close_pair, predicted
 from protocols.stability.protocol import OrbitStatus, StabilityParameters, StabilityPoint
 from protocols.stability.release import Released, combined, known_norm, parts_of, release
+from sim.gain import Branch, nearest_branch, predict_gain
 
 MOST_BISECTIONS = 12
 """Largest number of points added by the bisection."""
@@ -54,9 +55,11 @@ class Place:
 
 @dataclass(frozen=True)
 class _Trial:
-    """A motion to be held: its point, sine, prediction, also under other laws of restitution, and stabiliser."""
+    """A motion to be held: its predicted branches and sine, the predicted multiplier, also under other laws of
+    restitution, and the stabiliser.
+    """
 
-    place: Place
+    branches: Mapping[str, Branch]
     sine: Sine
     predicted: Predicted
     under: LawPrediction
@@ -159,7 +162,8 @@ class StabilityPlan:
         p, configuration, specimen = self._parameters, self._configuration, self._specimen
         amplitude, shaker = place.factor * specimen.uplift_acceleration, configuration.simulated_shaker
         fields: dict[str, Any] = {"omega_rad_s": place.omega, "amplitude_factor": place.factor, "beta": p.beta}
-        orbit = rocking(specimen, place.omega, amplitude)
+        branches = predict_gain(specimen, place.omega, amplitude).branches
+        orbit = branches["rocking"].orbit if "rocking" in branches else None
         design = prepared(orbit, shaker, p.harmonics)
         if orbit is None or design is None:
             reason = (
@@ -168,6 +172,13 @@ class StabilityPlan:
                 else "no stabiliser can be designed for the orbit"
             )
             return StabilityPoint(**fields, status=OrbitStatus.NOT_HELD, reason=reason)
+        slowest = design.cycle_map.slowest
+        if slowest.imag == 0.0:
+            reason = (
+                f"the dominant multiplier of the orbit on its table is real, {slowest.real:.4f}: only a pair of "
+                "complex multipliers can be measured"
+            )
+            return StabilityPoint(**fields, status=OrbitStatus.NOT_MEASURABLE, reason=reason)
         # the model of the table contains the recoil, which otherwise counts as an uncertainty
         known = configuration.known_on_table if shaker is None else configuration.known
         found = predicted(orbit, known, shaker, p.harmonics)
@@ -183,7 +194,7 @@ class StabilityPlan:
             yield Calibrate(calibration)
             point, fallen = None, True
             if not isinstance((yield Sweep(start.segments)), Fallen):
-                point, fallen = yield from self._held_point(_Trial(place, sine, found, under, design), fields, where)
+                point, fallen = yield from self._held_point(_Trial(branches, sine, found, under, design), fields, where)
             yield from end_test(specimen, fast=fallen)
             if point is None:
                 falls += 1
@@ -216,6 +227,11 @@ class StabilityPlan:
             return None, True
         if held.peak is None:
             values = {**fields, "captured_cycles": held.captured, "reason": held.reason}
+            return StabilityPoint.model_validate({**values, "status": OrbitStatus.NOT_HELD}), False
+        # the stabiliser takes any motion that repeats for the orbit, also that of the resting block
+        if nearest_branch(trial.branches, held.peak.drift, held.peak.u1) != "rocking":
+            reason = "the held motion is not on the rocking orbit, but nearer that of the resting block"
+            values = {**fields, "captured_cycles": held.captured, "reason": reason}
             return StabilityPoint.model_validate({**values, "status": OrbitStatus.NOT_HELD}), False
         found = trial.design.cycle_map
         released = yield from release(run, found, settled.table, p.beta, largest, p.released_cycles, p.hold_authority)
