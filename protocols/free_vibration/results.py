@@ -137,13 +137,15 @@ def _draw_spectrum(panel: "Axes", result: FrameResult) -> None:
     from scipy import signal
 
     welch: Any = signal.welch
+    # decays after a release by hand differ in length, the averaged spectra must not
+    segment = min(2048, *(one.fit.residual.shape[1] for one in result.decays))
     for row, colour in enumerate((BLUE, GREEN)):
         powers: list[np.ndarray] = []
         frequency = np.zeros(0)
         for one in result.decays:
             rate = 1.0 / one.fit.stretch.step
             left = one.fit.residual[row]
-            frequency, power = welch(left, rate, nperseg=min(2048, left.size))
+            frequency, power = welch(left, rate, nperseg=segment)
             powers.append(power)
         panel.loglog(
             frequency[1:],

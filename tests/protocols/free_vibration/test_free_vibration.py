@@ -253,6 +253,14 @@ def test_a_frame_let_go_by_hand_says_the_same_and_other_masses_are_told(tmp_path
     assert found.correlation(("k1", "m1"))[0, 1] > 0.3
 
 
+def test_decays_of_different_length_are_drawn_together(tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    parameters = FreeVibrationParameters(excitation="hand", repeats=2, window=5.0, pull=0.025)
+    result, _ = run(parameters, bench(), out, figures=True)
+    assert result.status == "completed"
+    assert (out / "free_vibration.png").exists()
+
+
 def test_a_run_that_fails_does_not_leave_the_table_clamped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def useless(*_: object) -> None:
         raise Unusable("nothing was seen")

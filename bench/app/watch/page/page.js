@@ -125,10 +125,12 @@ function show(changed) {
 
 function receive(message) {
   heard = performance.now();
+  // what `check` wrote over is drawn again, even if nothing has changed meanwhile
+  const lost = document.body.classList.contains("lost");
   document.body.classList.remove("lost");
   const changed = JSON.parse(message.data);
   Object.assign(found, changed);
-  if (!document.hidden) show(changed);
+  if (!document.hidden) show(lost ? found : changed);
 }
 
 /** Marks the page as not live, with the duration of the silence, if no message arrives. */
