@@ -99,7 +99,9 @@ class RunContents:
 
     def _finish(self, event: PointFinished) -> None:
         """Show the result of a point, with the same uncertainty as in the log and the data file."""
-        self._running = False
+        if self._running:
+            # the point that was being measured has ended
+            self._running, self.point = False, ""
         point, protocol = event.point.model_dump(), self.protocol
         if protocol is None:
             return

@@ -51,7 +51,7 @@ class MotionPlot(pg.PlotWidget):
         self.omega: float | None = None
         """Circular frequency of the base motion [rad/s]; None unless a steady sine is being measured."""
         self._since = 0.0
-        self._model = np.zeros((0, 3))
+        self._model, self._run = np.zeros((0, 3)), 0
         self._item: Any = self.getPlotItem()
         self._item.hideButtons()
         self._item.showGrid(x=True, y=True, alpha=0.25)
@@ -89,12 +89,16 @@ class MotionPlot(pg.PlotWidget):
 
     def forget(self) -> None:
         """Clear for a new run."""
-        self.omega, self._model = None, np.zeros((0, 3))
+        self.omega, self._model, self._run = None, np.zeros((0, 3)), 0
         for item in (self._behind, self._line, self._points):
             item.setData([], [])
 
     def add(self, estimate: TwinEstimate) -> None:
         """Append a part of the live model's motion."""
+        if estimate.run != self._run:
+            # each arming begins its time anew
+            self._run, self._model = estimate.run, np.zeros((0, 3))
+            self._behind.setData([], [])
         if self.kind == "phase" and len(estimate.trace):
             joined = np.concatenate((self._model, estimate.trace[:, (_T, _U1, _U2)]))
             self._model = joined[joined[:, 0] > joined[-1, 0] - MODELLED]

@@ -17,7 +17,7 @@ from bench.app.ipc.messages import (
     Question,
     SafetyInputs,
     Traces,
-    extremes,
+    extremes_from,
 )
 from bench.events import Acquired, Event, PointFinished, StepStarted
 from bench.live_values import Estimate, LiveValue, RunningGain, TwinEstimate
@@ -47,9 +47,12 @@ class Reduction:
                 signals[:, len(SIGNALS) :],
             )
         )
-        low, high = extremes(chosen, self._width)
+        # equally spaced bins that end with the block: spectra and velocities are computed from their distance
+        rows = len(signals)
+        bins = max(round(rows / self._width), 1)
+        low, high = extremes_from(chosen, np.arange(bins) * rows // bins)
         begin = self._origin + event.block.first / self._rate
-        step = self._width / self._rate
+        step = rows / (bins * self._rate)
         return Traces(event.run, begin, step, low, high, now(), self._origin, event.magnitudes())
 
 

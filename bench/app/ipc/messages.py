@@ -316,7 +316,13 @@ def extremes(values: NDArray[np.float64], width: int) -> tuple[NDArray[np.float3
     """Minimum and maximum of every `width` rows of `values`, shape (n, m); the last bin contains the remainder. A bin
     is NaN only if all its values are NaN.
     """
-    starts = np.arange(0, len(values), width)
+    return extremes_from(values, np.arange(0, len(values), width))
+
+
+def extremes_from(
+    values: NDArray[np.float64], starts: NDArray[np.intp]
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Minimum and maximum of the bins that begin at the rows `starts` of `values`, as `extremes` does."""
     low = np.fmin.reduceat(values, starts, axis=0)
     high = np.fmax.reduceat(values, starts, axis=0)
     return low.astype(np.float32), high.astype(np.float32)

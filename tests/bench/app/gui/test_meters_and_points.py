@@ -14,16 +14,17 @@ from bench.app.catalogue import load_protocol
 from bench.app.display.campaign import Campaign
 from bench.app.display.meters import Meter, meters_of
 from bench.app.display.samples import amplitude_spectrum
+from bench.app.display.theme import LIGHT
 from bench.app.display.verdict import verdict_of
 from bench.app.gui.controller import Controller
 from bench.app.gui.log_panel import LogPanel
-from bench.app.gui.motion_plot import stroboscopic
+from bench.app.gui.motion_plot import MotionPlot, stroboscopic
 from bench.app.gui.verdict import LARGEST, VerdictLabel
 from bench.app.run_display import Notice
 from bench.config.model import BenchConfiguration
 from bench.events import PointFinished
 from bench.guard.motion import WATCHED, MotionWatch
-from bench.live_values import Estimate
+from bench.live_values import Estimate, TwinEstimate
 from bench.preflight.margins import Demand, bounds, margins
 from drivers.rig import Channel
 from protocols.earthquake.protocol import PROTOCOL as EARTHQUAKE
@@ -32,6 +33,7 @@ from protocols.free_rocking.protocol import PROTOCOL as FREE_ROCKING
 from protocols.harmonic.protocol import PROTOCOL as HARMONIC
 from protocols.harmonic.protocol import HarmonicParameters, HarmonicPoint, PointStatus
 from tests.bench.app.ipc.experiment import order
+from tests.bench.twin.twin_bench import estimate
 
 
 def test_every_limit_of_a_motion_has_a_meter_with_the_planned_value() -> None:
@@ -183,3 +185,19 @@ def test_a_spectrum_has_the_amplitude_of_a_sine_and_a_section_one_point_of_it() 
     assert lines.max() == pytest.approx(3.0, rel=0.01)
     section = stroboscopic(time, np.column_stack((drift, time)), omega)
     assert section[:, 0] == pytest.approx(np.full(len(section), 3.0 * np.sin(0.3)), abs=1e-3)
+
+
+def test_the_phase_plane_forgets_the_model_of_the_previous_arming(qtbot: QtBot) -> None:
+    plot = MotionPlot(LIGHT, "phase")
+    qtbot.addWidget(plot)
+
+    def part(run: int, begin: float) -> TwinEstimate:
+        trace = np.zeros((100, 6))
+        trace[:, 0] = begin + 0.01 * np.arange(100)
+        return estimate(run=run, trace=trace)
+
+    for begin in (97.0, 98.0, 99.0):
+        plot.add(part(1, begin))
+    plot.add(part(2, 0.0))
+    assert plot._model[:, 0].max() < 1.0
+    assert len(plot._model) == 100

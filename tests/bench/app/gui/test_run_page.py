@@ -2,6 +2,7 @@
 
 from collections.abc import Generator
 from dataclasses import replace
+from math import nan
 from pathlib import Path
 
 import numpy as np
@@ -29,6 +30,7 @@ from drivers.rig import OperatorTask
 from protocols.earthquake.protocol import EarthquakePoint
 from protocols.earthquake.protocol import PointStatus as PointOutcome
 from protocols.harmonic.protocol import HarmonicParameters, HarmonicPoint, PointStatus
+from protocols.stability.protocol import OrbitStatus, StabilityPoint
 from sim.specimen import Specimen
 from tests.bench.app.gui.conftest import ScriptedClient
 from tests.bench.app.gui.shared_window import page_alone
@@ -242,6 +244,16 @@ def test_a_running_gain_ends_with_its_motion(page: RunPage, link: ScriptedClient
     assert len(page.gains._now.getData()[0]) == 0
 
 
+def test_a_point_without_a_gain_is_no_longer_said_to_be_measured(page: RunPage, link: ScriptedClient) -> None:
+    link.said = [Published(Estimate(16.0, 0.64, 12, 0.01, nan, nan, nan, time=1.0))]
+    page._controller._look()
+    assert "measuring" in page.point.text()
+    held = StabilityPoint(omega_rad_s=16.0, amplitude_factor=1.01, beta=0.64, status=OrbitStatus.NOT_HELD)
+    link.said = [Published(PointFinished(held, time=2.0))]
+    page._controller._look()
+    assert page.point.text() == ""
+
+
 def test_the_large_gain_names_its_point_and_its_uncertainty_is_that_of_the_file(
     page: RunPage, link: ScriptedClient
 ) -> None:
@@ -257,7 +269,7 @@ def test_the_large_gain_names_its_point_and_its_uncertainty_is_that_of_the_file(
     page._controller._look()
     assert "last point, steady: ω = 16 rad/s, β = 0.4" in run.point.text()
     assert run.verdict.sentence.startswith("α₂ 0.239 ± 0.011 · ")
-    nan = float("nan")
+
     link.said = [Published(Estimate(17.0, None, 1, 0.01, nan, nan, nan, time=3.0))]
     page._controller._look()
     assert "ω = 17 rad/s, bare frame" in run.point.text()

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from bench.analysis.signals import SignalMap
+from bench.app.display.buffers import Ring
 from bench.app.ipc.broadcast import Reduction
 from bench.app.ipc.messages import BIN, TRACES
 from bench.events import Acquired
@@ -74,3 +75,24 @@ def test_traces_hold_the_extremes_of_the_motion_that_was_made(reference: str) ->
     assert [each.begin for each in traces] == pytest.approx(4.0 + np.arange(0, N, BLOCK) / RATE)
     assert {each.origin for each in traces} == {traces[0].begin}
     assert {each.step for each in traces} == {width / RATE}
+
+
+@pytest.mark.parametrize(("rate", "block"), [(2000.0, 10), (2560.0, 256), (2048.0, 205), (1000.0, 5), (51200.0, 1)])
+def test_bins_of_any_block_are_equally_spaced_without_gaps(rate: float, block: int) -> None:
+    signals, reduction = SignalMap(CHANNELS, "ground"), Reduction(rate)
+    values = np.sin(np.arange(20 * block))[:, None] * np.ones(len(CHANNELS))
+    signals.tare(values[:block])
+    ring = Ring(len(TRACES), 1000)
+    for first in range(0, len(values), block):
+        rows = values[first : first + block]
+        counts = np.zeros(rows.shape, dtype=np.int32)
+        time = (first + block) / rate
+        event = Acquired(1, Block(first, counts), rows[:, 0], signals.of(rows), time=time)
+        traces = reduction(event)
+        assert traces.begin + traces.step * len(traces.low) == pytest.approx(time)
+        np.testing.assert_allclose(traces.low[:, 0].min(), rows[:, 0].min(), rtol=1e-6)
+        np.testing.assert_allclose(traces.high[:, 0].max(), rows[:, 0].max(), rtol=1e-6)
+        ring.add(traces)
+    time, low, _ = ring.newest_bins(1e3)
+    assert np.isfinite(low).all()
+    np.testing.assert_allclose(np.diff(time), time[1] - time[0])
