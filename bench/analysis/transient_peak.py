@@ -70,6 +70,8 @@ _RAISED = 0.5
 _DRAWS, _SEED, _HALVINGS = 2000, 20, 30
 _MISSING = 0.25
 """Largest fraction of missing samples in a window."""
+_STRONG = 0.5
+"""Magnitude beside a gap, relative to the peak, from which on the gap may hide a larger peak."""
 
 
 @dataclass(frozen=True)
@@ -95,7 +97,7 @@ def transient_peak(signal: Array, rest: Array, sample_rate: float) -> TransientP
     """The peak of |`signal`|, shape (n,), which is zero at rest; `rest`, shape (m,), is its noise without motion.
 
     NaN denotes a missing sample. Raises InvalidInput if `rest` is too short, if there is no motion above the noise, or
-    if samples are missing around the largest motion.
+    if samples are missing around the largest motion or in a gap that may hide a larger one.
     """
     known = np.isfinite(signal)
     if rest.size < 16 * _NARROWEST or not np.isfinite(rest).all():
@@ -116,6 +118,7 @@ def transient_peak(signal: Array, rest: Array, sample_rate: float) -> TransientP
         )
     found = [_maximum(whole, known, int(place), half, sigma) for place in _candidates(smooth, _RIVALS * spread)]
     greatest = max(found, key=lambda each: each.value)
+    _check_gaps(whole, known, half, greatest.value)
     value, uncertainty = _greatest(np.array([[each.value, each.uncertainty] for each in found]))
     return TransientPeak(
         value=value,
@@ -183,6 +186,19 @@ def _candidates(smooth: Array, near: float) -> NDArray[np.intp]:
     inner = np.flatnonzero((size[1:-1] >= size[:-2]) & (size[1:-1] > size[2:])) + 1
     places = np.append(inner, size.argmax())
     return np.unique(places[size[places] >= size.max() - near])
+
+
+def _check_gaps(whole: Array, known: NDArray[np.bool_], half: int, peak: float) -> None:
+    """Raise InvalidInput for a gap of more than `half` samples that may hide a motion larger than `peak`: within the
+    length of the gap before or after it, the signal reaches `_STRONG` of the peak.
+    """
+    edges = np.flatnonzero(np.diff(np.concatenate(([True], known, [True])).astype(np.int8)))
+    for begin, end in edges.reshape(-1, 2):
+        size = int(end - begin)
+        around = np.concatenate((whole[max(begin - size, 0) : begin], whole[end : end + size]))
+        if size > half and np.abs(around).max(initial=0.0) >= _STRONG * peak:
+            allowed = "it has no valid sample there, and the largest peak may lie there; repeat the test"
+            raise InvalidInput("transient", f"samples {begin} to {end - 1}", allowed)
 
 
 def _maximum(signal: Array, known: NDArray[np.bool_], place: int, half: int, sigma: float) -> _Maximum:

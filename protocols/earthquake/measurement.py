@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.analysis.fall import FallWatch
-from bench.analysis.signals import ACCELERATION, DISPLACEMENT, DRIFT, LASER_1, LASER_2, U1
+from bench.analysis.signals import ACCELERATION, DISPLACEMENT, DRIFT, LASER_1, LASER_2, SIGNALS, U1
 from bench.analysis.transient_base import BaseMotion, base_motion
 from bench.analysis.transient_peak import RunningPeak, TransientPeak, running_peak, transient_peak
 from bench.control.passes import SpectrumCheck
@@ -105,7 +105,7 @@ def _sensor_peak(signals: Array, still: Array, column: int, sample_rate: float) 
     window = signals[max(place - half, 0) : place + half + 1]
     # values and rates come from a fit over the window, which is insensitive to single samples
     time = (np.arange(len(window)) - min(place, half)) / sample_rate
-    lines = [_line(time, window[:, each]) for each in (LASER_1, LASER_2, DISPLACEMENT)]
+    lines = [_line(time, window[:, each], SIGNALS[each]) for each in (LASER_1, LASER_2, DISPLACEMENT)]
     (first, v1), (second, v2), (table, _) = lines
     swings = [float(np.nanmax(window[:, each]) - np.nanmin(window[:, each])) for each in (LASER_1, LASER_2)]
     return PeakSeen(
@@ -117,8 +117,10 @@ def _sensor_peak(signals: Array, still: Array, column: int, sample_rate: float) 
     )
 
 
-def _line(time: Array, values: Array) -> tuple[float, float]:
+def _line(time: Array, values: Array, name: str) -> tuple[float, float]:
     known = np.isfinite(values)
+    if np.count_nonzero(known) < 3:
+        raise InvalidInput(name, f"{np.count_nonzero(known)} valid samples", "it has too few of them around the peak")
     # a parabola, since a straight line misses the value at a turning point
     parabola = np.polynomial.Polynomial.fit(time[known], values[known], 2).convert()
     return float(parabola(0.0)), float(parabola.deriv()(0.0))

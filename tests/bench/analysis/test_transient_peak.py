@@ -101,6 +101,21 @@ def test_missing_samples() -> None:
         transient_peak(holed, rest, RATE)
 
 
+def test_a_gap_that_hides_the_largest_half_cycle_is_refused() -> None:
+    random = np.random.default_rng(2)
+    wave = np.concatenate((np.zeros(2000), damped(T)))
+    rest = 1e-4 * random.standard_normal(REST)
+    noisy = wave + 1e-4 * random.standard_normal(wave.size)
+    hidden = noisy.copy()
+    # from one zero to the next: the values beside the gap are small
+    hidden[2000 : 2000 + round(np.pi / 11.0 * RATE)] = np.nan
+    with pytest.raises(InvalidInput, match="the largest peak may lie there"):
+        transient_peak(hidden, rest, RATE)
+    late = noisy.copy()
+    late[2000 + round(3.5 * RATE) : 2000 + round(3.8 * RATE)] = np.nan
+    assert transient_peak(late, rest, RATE).value == pytest.approx(DAMPED, rel=5e-4)
+
+
 def test_refusals() -> None:
     random = np.random.default_rng(4)
     with pytest.raises(InvalidInput, match="not exceed the noise"):

@@ -15,6 +15,7 @@ from protocols.earthquake.campaign import check_statement
 from protocols.earthquake.draws import predict_draws
 from protocols.earthquake.measurement import STEP, GainMonitor, History, PeakSeen, observe, overturning_time
 from protocols.earthquake.uncertainty import drift_errors
+from sim.errors import InvalidInput
 from sim.excitation import SampledRecord
 from sim.gain import seismic_curve
 from sim.knowledge import SpecimenKnowledge
@@ -155,6 +156,19 @@ def test_a_record_observed_whole() -> None:
     table = 0.004 * np.sin(72.0)
     assert found.drift.lasers == pytest.approx((table - 0.006, table + 0.009), abs=2e-4)
     assert found.u1.table == pytest.approx(-table, abs=2e-4)
+
+
+def test_a_laser_without_a_value_at_the_peak_of_u1_is_named() -> None:
+    """Laser 2 is silent while storey 1 has its largest swing; the drift has its own elsewhere."""
+    rate, rest = 1000.0, 2000
+    t = np.arange(0.0, 12.0, 1.0 / rate)
+    early, late = (np.exp(-(((t - middle) / 0.5) ** 2)) for middle in (5.0, 8.0))
+    u1, drift = -0.006 * early, 0.015 * late
+    signals = np.column_stack((0.1 * early, 0.004 * early, u1, drift, u1, u1 + drift))
+    signals += np.array([1e-3, 1e-7, 1e-6, 1e-6, 1e-6, 1e-6]) * np.random.default_rng(1).standard_normal(signals.shape)
+    signals[4800:5200, 3] = signals[4800:5200, 5] = np.nan
+    with pytest.raises(InvalidInput, match=r"laser_2.*around the peak"):
+        observe(signals, rest, rate)
 
 
 def test_the_statement_falls_as_the_numbers_do() -> None:
