@@ -195,7 +195,8 @@ def _calibrated_sensors(found: LaserCalibration) -> Iterator[CalibratedSensor]:
         yield CalibratedSensor(
             sensor=name,
             scale=laser.scale,
-            scale_uncertainty=COVERAGE * found.differential_uncertainty,
+            # relative to the mean of both lasers: half the difference of their slopes
+            scale_uncertainty=0.5 * COVERAGE * found.differential_uncertainty,
             lowest_m=laser.lowest,
             highest_m=laser.highest,
             order=len(laser.error) - 1,

@@ -320,7 +320,11 @@ def test_a_calibration_on_the_simulated_bench_agrees_with_its_lasers_and_serves_
     assert abs(spans[1] - spans[0]) < 3.0 * one.differential_uncertainty
     assert abs(0.5 * sum(spans) - 1.0) < 3.0 * one.table_uncertainty
     with open_datafile(out / "campaign.h5") as record:
-        assert [row["sensor"] for row in record.points][:2] == ["laser_1", "laser_2"]
+        first, second, ratio = record.points[:3]
+    assert [first["sensor"], second["sensor"], ratio["sensor"]] == ["laser_1", "laser_2", "laser_2 / laser_1"]
+    # both scales are relative to their mean
+    assert first["scale_uncertainty"] == second["scale_uncertainty"] == pytest.approx(0.5 * ratio["scale_uncertainty"])
+    assert second["scale"] - first["scale"] == pytest.approx(ratio["scale"] - 1.0, rel=1e-2)
     capsys.readouterr()
 
     old = one.model_copy(update={"date": datetime(2020, 1, 1, tzinfo=UTC)})
