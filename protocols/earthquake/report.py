@@ -307,7 +307,7 @@ def histories_parts(campaign: Campaign) -> list[Part]:
         if some:
             caption = (
                 "Drift of the bare frame and of the frame coupled by the softest spring: measured, and predicted "
-                "for the achieved table motion."
+                "for the achieved table motion; without a prediction for a test that ended early."
             )
             parts.append(Picture(drift_figure(some), caption, "Drift against time, one row per record."))
     return parts
@@ -332,7 +332,11 @@ def _bare_and_softest(plays: Sequence[Played]) -> list[Played]:
 
 
 def _predicted_drift(campaign: Campaign, shaking: Shaking, play: Played, shown: Floats) -> Floats:
-    """Predicted drift [m] every `STEP` seconds under the measured table motion; empty if it cannot be evaluated."""
+    """Predicted drift [m] every `STEP` seconds under the measured table motion; empty if it cannot be evaluated, as for
+    a test that ended before its record: its table motion does not end at rest.
+    """
+    if len(shown) < shaking.target.acceleration.size:
+        return np.zeros(0)
     specimen = campaign.specimen.bare() if play.beta is None else campaign.specimen.coupled(play.beta)
     try:
         base = observe(shown, shaking.target.rest, campaign.record.sample_rate).base

@@ -1,11 +1,13 @@
 """Report on a campaign from its data file: the protocol's sections, followed by those common to all campaigns."""
 
 from collections.abc import Callable, Sequence
+from math import isfinite
 from typing import Any
 
 import numpy as np
 
 from bench.analysis.check_line import OWN_UNIT
+from bench.analysis.uncertainty import decimals
 from bench.app.reports.limits import limits_section
 from bench.app.reports.provenance import provenance_line, provenance_section
 from bench.app.reports.specimen import identified_section, modes_section, specimen_section
@@ -14,6 +16,7 @@ from bench.document.campaign import Campaign
 from bench.document.document import Column, Document, Listing, Notice, Part, Picture, Section, Table
 from bench.document.typography import (
     ABSENT,
+    MINUS,
     counted,
     first_words,
     label,
@@ -44,7 +47,12 @@ def points_section(campaign: Campaign) -> Section | None:
         Column(_heading(name, each.unit), _column_unit(each.unit), each.values.dtype.kind in "SU")
         for name, each in results.items()
     ]
-    rows = [[_cell(each, row) for each in results.values()] for row in range(min(len(campaign.points), MOST_CELLS))]
+    named = {without_unit(name, each.unit): each for name, each in results.items()}
+    uncertain = {name: named.get(f"{without_unit(name, each.unit)}_uncertainty") for name, each in results.items()}
+    rows = [
+        [_cell(each, row, uncertain[name]) for name, each in results.items()]
+        for row in range(min(len(campaign.points), MOST_CELLS))
+    ]
     parts: list[Part] = [Table(f"Results of the protocol {campaign.protocol}", columns, rows)]
     if len(campaign.points) > MOST_CELLS:
         parts.append(f"Further results in the file: {len(campaign.points) - MOST_CELLS}.")
@@ -61,14 +69,18 @@ def _heading(name: str, unit: str) -> str:
     return typeset(without_unit(name, unit).replace("_", " "))
 
 
-def _cell(stored: Stored, row: int) -> str:
+def _cell(stored: Stored, row: int, uncertainty: Stored | None) -> str:
+    """A value, to the decimal place of its `uncertainty` where there is one in the same unit."""
     value: Any = stored.values[row]
     if isinstance(value, str | bytes):
         text = value.decode() if isinstance(value, bytes) else value
         return typeset(text) or ABSENT
     if isinstance(value, bool | np.bool_):
         return "yes" if value else "no"
-    return plain(float(value))
+    places = None
+    if uncertainty is not None and uncertainty.unit == stored.unit and isfinite(value):
+        places = decimals(float(uncertainty.values[row]))
+    return plain(float(value)) if places is None else f"{float(value):.{places}f}".replace("-", MINUS)
 
 
 COVERAGE = 2.0

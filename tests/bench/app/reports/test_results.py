@@ -22,6 +22,33 @@ class Found(Parameters):
     remark: str = quantity("", "", "what was noticed")
 
 
+class Scaled(Parameters):
+    """A result whose digits matter."""
+
+    sensor: str = quantity(..., "", "name")
+    scale: float = quantity(..., "1", "span")
+    scale_uncertainty: float | None = quantity(None, "1", "expanded uncertainty")
+
+
+def test_a_result_is_shown_to_the_decimal_place_of_its_uncertainty(tmp_path: Path) -> None:
+    recorder = Recorder(
+        tmp_path / "run.h5",
+        channels=LoopbackRig().channels,
+        sample_rate=1000.0,
+        point_type=Scaled,
+        metadata={"protocol": "made"},
+    )
+    recorder(PointFinished(Scaled(sensor="one", scale=1.000341, scale_uncertainty=5.1e-5), time=1.0))
+    recorder(PointFinished(Scaled(sensor="two", scale=-1.000341), time=2.0))
+    recorder.close("completed")
+    with open_datafile(tmp_path / "run.h5") as record:
+        points = points_section(Campaign(tmp_path / "run.h5", record))
+    assert points is not None
+    results = points.parts[0]
+    assert isinstance(results, Table)
+    assert [row[1] for row in results.rows] == ["1.000341", "−1"]
+
+
 def test_fits_and_points_are_shown_with_their_units(tmp_path: Path) -> None:
     rig, time = LoopbackRig(), np.linspace(0.0, 5.0, 200)
     columns = {

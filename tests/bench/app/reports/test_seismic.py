@@ -28,7 +28,14 @@ from bench.testing.loopback import LoopbackRig
 from drivers.rig import Channel, Counts, OperatorTask
 from protocols.earthquake.measurement import GainMonitor
 from protocols.earthquake.protocol import EarthquakeParameters, EarthquakePoint, PointStatus
-from protocols.earthquake.report import played_records, seismic_sections, signals_of
+from protocols.earthquake.report import (
+    Played,
+    _predicted_drift,
+    _shakings,
+    played_records,
+    seismic_sections,
+    signals_of,
+)
 from sim.specimen import Specimen
 from sim.virtual_bench import VirtualBenchParameters
 from tests.recorded import recorded
@@ -243,3 +250,22 @@ def test_measured_and_predicted_drifts_have_their_own_intervals() -> None:
     figure = drift_figure([DriftPicture("one", None, 20.0 / 2048.0, measured, predicted, 0.01)])
     ends = [float(line.get_xdata()[-1]) for line in figure.axes[0].get_lines() if len(line.get_xdata()) > 2]
     assert sorted(ends) == pytest.approx([1.99, 299 * 20.0 / 2048.0])
+
+
+def test_a_test_that_ended_early_has_no_predicted_drift(file: Path) -> None:
+    """Its table motion does not end at rest, as the evaluation of the base motion requires."""
+    parameters = EarthquakeParameters(records=("synthetic:pacoima",), table_band="1.5:25")
+    with open_datafile(file) as record:
+        campaign = Campaign(file, record)
+        (shaking,) = _shakings(campaign, parameters)
+        play, n = Played(NAME, None, 0, 0, shaking.target.acceleration.size), shaking.target.acceleration.size
+        t = np.arange(n) / 2000.0
+        bell = np.exp(-(((t - 0.5 * t[-1]) / 1.0) ** 2))
+        table = 0.01 * bell * np.sin(12.0 * t)
+        shown = np.column_stack(
+            (np.gradient(np.gradient(table, t), t), table, 0.006 * bell, 0.015 * bell, table, table + 0.015 * bell)
+        )
+        noise = np.array([1e-3, 1e-7, 1e-6, 1e-6, 1e-6, 1e-6])
+        shown += noise * np.random.default_rng(1).standard_normal(shown.shape)
+        assert _predicted_drift(campaign, shaking, play, shown).size > 100
+        assert _predicted_drift(campaign, shaking, play, shown[: round(0.6 * n)]).size == 0
