@@ -128,6 +128,9 @@ class QueueRunner(QObject):
     def _pause_if_stopped(self) -> None:
         if self.going and self._controller.latched:
             self.pause(texts.QUEUE_STOPPED)
+        elif self.why == texts.QUEUE_STOPPED and not self._controller.latched:
+            self.why = ""
+            self.changed.emit()
 
     def _place(self, test: Queued) -> int | None:
         """Index of a test by identity, since a copy may be equal to it."""

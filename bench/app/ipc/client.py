@@ -9,6 +9,7 @@ import threading
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import replace
 from multiprocessing import AuthenticationError
 from multiprocessing.connection import Client, Connection
 from pathlib import Path
@@ -230,7 +231,8 @@ class AttachedClient(ClientConnection):
     def __init__(
         self, session: RunningSession, on_message: Callable[[], None] = lambda: None, *, read_only: bool = False
     ) -> None:
-        super().__init__(Path(session.out), on_message)
+        self._folder = Path(session.out)
+        super().__init__(self._folder, on_message)
         if read_only:
             self._outgoing.put(ReadOnly())
         self._talking = threading.Thread(target=self._talk, args=(session,), name="link", daemon=True)
@@ -239,6 +241,10 @@ class AttachedClient(ClientConnection):
     @property
     def lives(self) -> bool:
         return self._talking.is_alive()
+
+    def _keep(self, message: FromSession) -> None:
+        # the folder of the message may be relative to the working folder of the session
+        super()._keep(replace(message, out=self._folder) if isinstance(message, Ended) else message)
 
     def _talk(self, session: RunningSession) -> None:
         with (

@@ -114,9 +114,8 @@ class Queue:
         self._change([*self._tests, test])
 
     def replace(self, index: int, test: Queued) -> None:
-        """Replace a test that has not begun. Raises InvalidInput for one that has."""
-        self._open(index, "edited")
-        self._set(index, test)
+        """Replace a test that has not begun; a skipped one remains skipped. Raises InvalidInput for one that has."""
+        self._set(index, test, stage=self._open(index, "edited").stage)
 
     def remove(self, index: int) -> None:
         """Remove a test. Raises InvalidInput for the running one."""
@@ -182,11 +181,11 @@ def _refused(index: int, test: Queued, allowed: str) -> InvalidInput:
 
 
 def _another(folder: str | None, taken: set[str | None]) -> str | None:
-    """A folder next to `folder` that no other test uses: `name-2`, `name-3`, ..."""
+    """A folder next to `folder` that no other test uses and that does not exist: `name-2`, `name-3`, ..."""
     if folder is None:
         return None
     number = 2
-    while (name := f"{folder}-{number}") in taken:
+    while (name := f"{folder}-{number}") in taken or Path(name).exists():
         number += 1
     return name
 

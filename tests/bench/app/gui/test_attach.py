@@ -17,7 +17,7 @@ from pytestqt.qtbot import QtBot
 from bench.app.display.theme import LIGHT
 from bench.app.gui.controller import Controller
 from bench.app.gui.window import Window
-from bench.app.ipc.messages import Ask, Attached, receive
+from bench.app.ipc.messages import Ask, Attached, Ended, Refused, receive
 from bench.app.ipc.server import SessionServer
 from bench.app.ipc.sessions import running_sessions
 from bench.datafile.reader import open_datafile
@@ -36,8 +36,11 @@ pytestmark = pytest.mark.skipif(os.name != "posix", reason="kills a process the 
 def session(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Generator[subprocess.Popen[str]]:
     """A window's process that is killed while its run, which goes on without it, drives the table."""
     monkeypatch.setenv("ROCKBENCH_SESSIONS", str(tmp_path / "sessions"))
-    command = [sys.executable, "-m", "tests.bench.app.ipc.lone_client", str(tmp_path / "run"), "go on", "400"]
-    with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True) as client:
+    # in another working folder than the window's, with a relative folder for its results, as on a command line
+    command = [sys.executable, "-m", "tests.bench.app.ipc.lone_client", "run", "go on", "400"]
+    paths = os.pathsep.join(filter(None, (str(ROOT), os.environ.get("PYTHONPATH"))))
+    environment = os.environ | {"PYTHONPATH": paths}
+    with subprocess.Popen(command, cwd=tmp_path, env=environment, stdout=subprocess.PIPE, text=True) as client:
         assert client.stdout is not None
         while client.stdout.readline().strip() != "running":
             assert client.poll() is None
@@ -70,9 +73,14 @@ def test_a_window_after_a_killed_one_has_state_log_and_stop(
     assert not window.protocol.start.isEnabled()
     assert window.protocol.why_not == "a run is under way"
     qtbot.waitUntil(lambda: controller.session.controls, timeout=LONG_MS)
+    ended = list[Ended | Refused]()
+    controller.ended.connect(ended.append)
     qtbot.mousePress(window.header.stop, Qt.MouseButton.LeftButton)
     qtbot.waitUntil(lambda: not controller.running, timeout=LONG_MS)
     window.close()
+    (end,) = ended
+    assert isinstance(end, Ended)
+    assert end.out == tmp_path / "run"
     with open_datafile(tmp_path / "run" / "campaign.h5") as record:
         assert (record.status, record.summary) == ("aborted", "abort requested")
     assert running_sessions() == []

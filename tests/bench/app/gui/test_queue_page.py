@@ -187,9 +187,11 @@ def test_stop_pauses_and_nothing_starts_by_itself_after_it(
     assert _stages(filled) == [Stage.FAILED, Stage.WAITING, Stage.WAITING]
     filled.runner.start()
     assert (filled.runner.going, filled.queue.start.toolTip()) == (False, texts.LATCHED)
+    assert texts.QUEUE_STOPPED in filled.queue.status.text()
     filled._controller.clear_stop()
     qtbot.wait(50)
     assert spoken.latest is link, "clearing starts nothing either"
+    assert texts.QUEUE_STOPPED not in filled.queue.status.text()
     assert filled.queue.start.isEnabled()
 
 

@@ -97,6 +97,22 @@ def test_whatever_is_done_a_test_that_began_stays_as_it_was_and_no_two_share_a_f
     assert list(QueueFile(store.path).read()) == left
 
 
+def test_a_skipped_test_that_is_edited_stays_skipped() -> None:
+    queue = Queue([Queued(protocol="p", out="one")])
+    queue.skip(0)
+    queue.replace(0, Queued(protocol="p", out="one", note="later"))
+    assert (queue.tests[0].stage, queue.tests[0].note) == (Stage.SKIPPED, "later")
+    assert queue.next is None
+
+
+def test_a_copy_has_a_folder_that_does_not_exist_yet(tmp_path: Path) -> None:
+    out = tmp_path / "one"
+    queue = Queue([Queued(protocol="p", out=str(out))])
+    (tmp_path / "one-2").mkdir()
+    queue.repeat(0, 2)
+    assert [each.out for each in queue.tests] == [str(out), f"{out}-3", f"{out}-4"]
+
+
 def test_a_change_that_cannot_be_kept_is_not_made(tmp_path: Path) -> None:
     store = QueueFile(tmp_path / "queue.json")
     queue = Queue(store.read(), store.write)
