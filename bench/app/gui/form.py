@@ -1,6 +1,6 @@
 """Forms generated from the declared parameters of a protocol, and the options of a run."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, cast
 
@@ -252,6 +252,19 @@ class RunOptions(QWidget):
             keep_going=self.keep_going.isChecked(),
             about={name: text for name, text in told.items() if text},
         )
+
+    def kept(self) -> Callable[[], None]:
+        """A function that shows the present options again."""
+        lines = [(field, field.text()) for field in (self.folder, self.operator, self.note)]
+        boxes = [(box, box.isChecked()) for box in (self.realtime, self.person, self.keep_going)]
+
+        def restore() -> None:
+            for field, text in lines:
+                field.setText(text)
+            for box, checked in boxes:
+                box.setChecked(checked)
+
+        return restore
 
     def load(self, test: Queued) -> None:
         """Show the options of a queued test."""

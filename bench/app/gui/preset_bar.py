@@ -110,22 +110,25 @@ class PresetBar(QWidget):
     def load(self) -> None:
         """Fill the form with the named preset."""
         presets, protocol, name = self._presets, self._protocol, self.name.currentText().strip()
-        if presets is not None and protocol is not None and self._listed(name):
+        if presets is None or protocol is None or not self._listed(name):
+            return
+        if self._fill(lambda: presets.load(protocol.name, name), texts.PRESET_LOADED.format(name=name)):
             self._loaded, self._replaced = name, ""
-            self._fill(lambda: presets.load(protocol.name, name), texts.PRESET_LOADED.format(name=name))
 
     def _fill_last(self) -> None:
         presets, protocol = self._presets, self._protocol
         if presets is not None and protocol is not None:
             self._fill(lambda: presets.last(protocol.name) or {}, texts.LAST_VALUES_SHOWN)
 
-    def _fill(self, values: Callable[[], Mapping[str, Any]], done: str) -> None:
+    def _fill(self, values: Callable[[], Mapping[str, Any]], done: str) -> bool:
+        """Whether the values could be read."""
         try:
             self.filled.emit(values())
         except RockbenchError as error:
             self._say(str(error), "alarm")
-        else:
-            self.report(done)
+            return False
+        self.report(done)
+        return True
 
     def _save(self) -> None:
         presets, protocol, form, name = self._presets, self._protocol, self._form, self.name.currentText().strip()
@@ -145,8 +148,8 @@ class PresetBar(QWidget):
             self._list(name)
 
     def _delete(self) -> None:
-        presets, protocol, name = self._presets, self._protocol, self.name.currentText().strip()
-        if presets is None or protocol is None:
+        presets, protocol, name = self._presets, self._protocol, self._listed(self.name.currentText().strip())
+        if presets is None or protocol is None or not name:
             return
         try:
             presets.delete(protocol.name, name)
@@ -160,9 +163,14 @@ class PresetBar(QWidget):
         self._say("", "calm")
         self._refresh()
 
-    def _listed(self, name: str) -> bool:
-        # on some systems, names that differ only in case denote the same file
-        return name.casefold() in [self.name.itemText(place).casefold() for place in range(self.name.count())]
+    def _listed(self, name: str) -> str:
+        """The preset of this name in its own spelling, or one that differs only in case, which denotes the same file on
+        some systems; empty if there is none.
+        """
+        names = [self.name.itemText(place) for place in range(self.name.count())]
+        return next((each for each in names if each == name), "") or next(
+            (each for each in names if each.casefold() == name.casefold()), ""
+        )
 
     def _list(self, name: str) -> None:
         """List the presets of the protocol, and show `name`."""

@@ -1,6 +1,6 @@
 """The Protocol page: parameter form, plan check, and start or queueing of a run."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from datetime import datetime
 from itertools import pairwise
@@ -60,8 +60,11 @@ class ProtocolPage(QWidget):
         self._controller, self._configuration, self._entries = controller, configuration, tuple(entries)
         self._first_values = {"omega": (16.0,), "beta": (0.4,)} if tour else None
         self._checked: PlanChecked | None = None
+        self._carried_out: PlanChecked | None = None
         self._checking = self._began = self._unattended = False
         self._edited_test: Queued | None = None
+        self._show_former: Callable[[], None] | None = None
+        """Shows the options of a run that the form had before a queued test was edited."""
         self._made: Path | None = None
         self._folder = ""
         """Text of the folder of the current or last run."""
@@ -158,7 +161,7 @@ class ProtocolPage(QWidget):
             self._show_plan()
             self.plan.refuse(str(error))
             return
-        self._began, self._folder = True, self.folder.text()
+        self._began, self._folder, self._carried_out = True, self.folder.text(), checked
         self.predicted.emit(checked.prediction)
         self._controller.start(self.options.run(plan))
 
@@ -177,6 +180,8 @@ class ProtocolPage(QWidget):
 
     def edit(self, test: Queued, number: int) -> None:
         """Show `test`, number `number` of the queue, in the form to be edited."""
+        if self._edited_test is None:
+            self._show_former = self.options.kept()
         self._edited_test = test
         self.choice.setCurrentIndex([entry.name for entry in self._entries].index(test.protocol))
         self._show_form(Form(self.entry.parameters, test.parameters))
@@ -191,7 +196,8 @@ class ProtocolPage(QWidget):
         """End the editing of a queued test."""
         if self._edited_test is not None:
             self._edited_test = None
-            self.folder.clear()
+            if self._show_former is not None:
+                self._show_former()
             self.add.setText(texts.ADD)
             self.leave.hide()
             self.refresh()
@@ -296,8 +302,10 @@ class ProtocolPage(QWidget):
             self._made = None
         if self._began:
             self._began = False
-            if self._edited_test is None and self.folder.text() == self._folder:
-                # the folder is now in use: the next run needs another
+            used = self._folder or self._checked is self._carried_out
+            if self._edited_test is None and used and self.folder.text() == self._folder:
+                # the folder is now in use: the next run needs another. Without a folder, a plan that was checked during
+                # the run stays checked
                 self.folder.clear()
                 self._edited()
 

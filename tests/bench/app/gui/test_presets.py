@@ -140,6 +140,31 @@ def test_a_preset_that_was_not_loaded_is_replaced_after_a_second_press_only(qtbo
     assert "# by hand" not in file.read_text(encoding="utf-8")
 
 
+def test_a_name_in_another_case_deletes_the_preset_that_it_shows(qtbot: QtBot, tmp_path: Path) -> None:
+    file = tmp_path / "presets" / "harmonic" / "Monday.toml"
+    file.parent.mkdir(parents=True)
+    file.write_text("omega = [12.5]\n", encoding="utf-8")
+    page = _page(qtbot, tmp_path)
+    page.choice.setCurrentText("harmonic")
+    page.presets.name.setEditText("monday")
+    qtbot.mouseClick(page.presets.delete, Qt.MouseButton.LeftButton)
+    assert page.presets.message.text() == texts.PRESET_DELETED.format(name="Monday")
+    assert not file.exists()
+
+
+def test_a_preset_that_cannot_be_read_is_not_replaced_at_the_first_press(qtbot: QtBot, tmp_path: Path) -> None:
+    file = tmp_path / "presets" / "harmonic" / "Monday.toml"
+    file.parent.mkdir(parents=True)
+    file.write_text("omega = [12.5", encoding="utf-8")
+    page = _page(qtbot, tmp_path)
+    page.choice.setCurrentText("harmonic")
+    page.presets.name.setCurrentIndex(0)
+    page.presets.name.activated.emit(0)
+    assert "not valid TOML" in page.presets.message.text()
+    qtbot.mouseClick(page.presets.save, Qt.MouseButton.LeftButton)
+    assert file.read_text(encoding="utf-8") == "omega = [12.5"
+
+
 def test_values_that_no_longer_hold_are_shown_with_the_reason(qtbot: QtBot, tmp_path: Path) -> None:
     folder = tmp_path / "presets" / "free-vibration"
     folder.mkdir(parents=True)

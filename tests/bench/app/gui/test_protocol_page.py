@@ -1,5 +1,6 @@
 """The form says what the declaration says; nothing starts before its plan was checked."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -128,6 +129,34 @@ def test_the_folder_of_the_next_run_is_kept_when_a_run_ends(
     spoken.latest.said.append(Ended("completed", "", {}, "", tmp_path / "first"))
     window._controller._look()
     assert page.folder.text() == left
+
+
+def test_a_plan_checked_during_a_run_stays_checked_when_the_run_ends(
+    window: Window, spoken: type[ScriptedClient], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    page = window.protocol
+    page.folder.clear()
+
+    def check() -> None:
+        page.check_plan()
+        spoken.latest.said.append(replace(FINE))
+        window._controller._look()
+
+    check()
+    page.begin()
+    run = spoken.latest
+    field = next(each for each in page.form.fields.values() if isinstance(each, QLineEdit))
+    field.setText(field.text() + " ")
+    check()
+    run.said.append(Ended("completed", "", {}, "", tmp_path / "first"))
+    window._controller._look()
+    assert page.start.isEnabled()
+    # but a plan that was carried out is checked again
+    page.begin()
+    spoken.latest.said.append(Ended("completed", "", {}, "", tmp_path / "second"))
+    window._controller._look()
+    assert not page.start.isEnabled()
 
 
 @pytest.mark.parametrize("left", [(), ("campaign.h5",)])

@@ -303,6 +303,22 @@ def test_what_waits_is_edited_in_its_form_and_what_began_is_not(
     assert [name for name, button in filled.queue.buttons.items() if button.isEnabled()] == ["repeat"]
 
 
+def test_options_of_an_edited_test_do_not_apply_to_the_next_run(filled: Window) -> None:
+    page, options = filled.protocol, filled.protocol.options
+    options.operator.setText("Weber")
+    options.folder.setText("mine")
+    options.person.setChecked(True)
+    before = options.for_queue
+    test = filled.runner.queue.tests[1]
+    other = test.model_copy(update={"operator": "Müller", "note": "theirs", "unattended": True, "keep_going": True})
+    page.edit(other, 2)
+    page.edit(other, 2)
+    assert options.for_queue != before
+    page.leave_editing()
+    assert options.for_queue == before
+    assert options.folder.text() == "mine"
+
+
 def test_a_test_that_begins_while_it_is_edited_is_not_changed(
     filled: Window, spoken: type[ScriptedClient], qtbot: QtBot
 ) -> None:
