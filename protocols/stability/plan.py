@@ -205,7 +205,7 @@ class StabilityPlan:
         if last.status is OrbitStatus.OVERTURNED:
             update = {"starts_tried": falls, "reason": f"the block fell after every start ({falls} tried)"}
             return last.model_copy(update=update)
-        return last
+        return last.model_copy(update={"starts_tried": len(starts)})
 
     def _held_point(
         self, trial: _Trial, fields: Mapping[str, Any], where: str

@@ -1,7 +1,8 @@
 """Boundaries from points and curves, predicted multipliers, and the deflection before a release."""
 
-from collections.abc import Generator
+from collections.abc import Generator, Mapping
 from math import hypot
+from typing import Any
 
 import numpy as np
 import pytest
@@ -158,21 +159,49 @@ class _Measured(StabilityPlan):
         return point(place.omega, 1.0 + 0.1 * (place.omega - 15.33))
 
 
-def test_progress_through_a_bisection_never_goes_back_and_ends_with_its_last_point() -> None:
-    parameters = StabilityParameters(omega=(15.0, 16.0), bracket=0.01)
-    places = [Place(omega, 1.01) for omega in parameters.omega]
-    start = Start("direct", (Segment(8.0, AMPLITUDE, 15.0),), 0.5)
-    plan = _Measured(parameters, BenchConfiguration(), dict.fromkeys(places, (start,)))
-    steps, said = plan.steps(), list[Progress]()
+class _HeldOnce(StabilityPlan):
+    """A plan in which the motion after the first start cannot be held, and the block falls after each later one."""
+
+    def _held_point(
+        self, _trial: object, fields: Mapping[str, Any], where: str
+    ) -> Generator[Step, Outcome, tuple[StabilityPoint | None, bool]]:
+        yield Publish(self._pace.progress("holding", 15.0, 100))
+        if "start 1 of" not in where:
+            return None, True
+        update = {"status": OrbitStatus.NOT_HELD, "reason": "not captured"}
+        return StabilityPoint.model_validate({**fields, **update}), False
+
+
+def steps_of(plan: StabilityPlan) -> list[Step]:
+    """All steps of a plan, answered by a bench whose motion is always the same."""
+    steps, done = plan.steps(), list[Step]()
     step: Step | None = next(steps)
     while step is not None:
-        if isinstance(step, Publish) and isinstance(step.event, Progress):
-            said.append(step.event)
+        done.append(step)
         made = Measured(tuple(cycle(k, 0.001) for k in range(step.cycles))) if isinstance(step, Dwell) else Done()
         try:
             step = steps.send(made)
         except StopIteration:
             step = None
+    return done
+
+
+def test_all_starts_are_counted_if_those_after_the_first_fall() -> None:
+    start = Start("direct", (Segment(8.0, AMPLITUDE, 15.0),), 0.5)
+    plan = _HeldOnce(StabilityParameters(omega=(15.0,)), BenchConfiguration(), {Place(15.0, 1.01): (start,) * 3})
+    steps_of(plan)
+    (found,) = plan.points
+    assert (found.status, found.reason) == (OrbitStatus.NOT_HELD, "not captured")
+    assert found.starts_tried == 3
+
+
+def test_progress_through_a_bisection_never_goes_back_and_ends_with_its_last_point() -> None:
+    parameters = StabilityParameters(omega=(15.0, 16.0), bracket=0.01)
+    places = [Place(omega, 1.01) for omega in parameters.omega]
+    start = Start("direct", (Segment(8.0, AMPLITUDE, 15.0),), 0.5)
+    plan = _Measured(parameters, BenchConfiguration(), dict.fromkeys(places, (start,)))
+    published = [step.event for step in steps_of(plan) if isinstance(step, Publish)]
+    said = [event for event in published if isinstance(event, Progress)]
     assert len(plan.points) > 3
     fractions = [each.fraction for each in said]
     assert fractions == sorted(fractions)
