@@ -29,6 +29,16 @@ Curve = Mapping[str, NDArray[Any]]
 
 ABSENT = "-"
 
+STABLE, UNSTABLE, OPEN = "stable", "unstable", "not distinguishable from 1"
+"""Classes of a measured modulus; `OPEN` if its interval contains 1."""
+
+FILLS: Mapping[str, dict[str, Any]] = {
+    STABLE: {"markerfacecolor": "white"},
+    UNSTABLE: {"markerfacecolor": BLACK},
+    OPEN: {"markerfacecolor": BLACK, "markerfacecoloralt": "white", "fillstyle": "bottom"},
+}
+"""Fills of the classes' markers."""
+
 LAWS = (
     "laws of restitution (normalised deviation: measured minus predicted, divided by the combined expanded "
     "uncertainty; the restitution is exact):"
@@ -54,6 +64,15 @@ def by_amplitude(curve: Curve) -> bool:
     all planned points.
     """
     return np.unique(curve["amplitude_factor"]).size > 1
+
+
+def stability(point: StabilityPoint) -> str | None:
+    """Class of a point's modulus; None if it was not measured."""
+    if point.modulus is None:
+        return None
+    if abs(point.modulus - 1.0) <= (point.modulus_uncertainty or 0.0):
+        return OPEN
+    return UNSTABLE if point.modulus > 1.0 else STABLE
 
 
 def measured_boundaries(points: Sequence[StabilityPoint], *, over: bool = False) -> list[Boundary]:
@@ -83,11 +102,7 @@ def stability_table(points: Sequence[StabilityPoint], curve: Curve) -> str:
     lines = [text_table(_COLUMNS, map(_cells, rows)), "", *boundary_texts(rows, curve)]
     if laws := laws_texts(rows, curve):
         lines += ["", LAWS, *laws, ""]
-    lines += [
-        f"{point.omega_rad_s:g} rad/s, amplitude factor {point.amplitude_factor:g}: {point.reason}"
-        for point in rows
-        if point.reason
-    ]
+    lines += _remarks(rows)
     return "\n".join(lines)
 
 
@@ -102,9 +117,9 @@ def boundary_texts(points: Sequence[StabilityPoint], curve: Curve) -> list[str]:
         for each in found
     ]
     if not found:
-        stable = [point.modulus < 1.0 for point in points if point.modulus is not None]
-        if stable:
-            lines.append(f"no boundary was crossed: every measured orbit is {'stable' if stable[0] else 'unstable'}")
+        classes = [each for point in points if (each := stability(point)) is not None]
+        if classes:
+            lines.append(f"no boundary was crossed: {_summary(classes)}")
     for ground, words in (("table", "on the simulated table"), ("fixed", "on fixed ground")):
         if np.isfinite(curve[f"{ground}_modulus"]).any():
             places = predicted_boundaries(curve, ground)
@@ -113,10 +128,31 @@ def boundary_texts(points: Sequence[StabilityPoint], curve: Curve) -> list[str]:
     return lines
 
 
+def _summary(classes: Sequence[str]) -> str:
+    """Statement on orbits whose moduli are all on one side of 1."""
+    clear = [each for each in classes if each != OPEN]
+    if not clear:
+        return f"every measured modulus is {OPEN} (k = 2)"
+    left = len(classes) - len(clear)
+    if not left:
+        return f"every measured orbit is {clear[0]}"
+    are, others = "orbit is" if len(clear) == 1 else "orbits are", "modulus is" if left == 1 else "moduli are"
+    return f"{len(clear)} measured {are} {clear[0]}, {left} {others} {OPEN} (k = 2)"
+
+
 def laws_texts(points: Sequence[StabilityPoint], curve: Curve) -> list[str]:
     """Statements on the laws of restitution."""
     over = by_amplitude(curve)
     return law_texts(points, measured_boundaries(points, over=over), curve, "" if over else " rad/s")
+
+
+def _remarks(points: Sequence[StabilityPoint]) -> list[str]:
+    return ["{} rad/s, amplitude factor {}: ".format(*_place(point)) + point.reason for point in points if point.reason]
+
+
+def _place(point: StabilityPoint) -> tuple[str, str]:
+    """Frequency and amplitude factor, with the digits in which points of the bisection differ."""
+    return f"{point.omega_rad_s:.4f}", f"{point.amplitude_factor:.4f}"
 
 
 def _cells(point: StabilityPoint) -> list[str]:
@@ -127,8 +163,7 @@ def _cells(point: StabilityPoint) -> list[str]:
         return ABSENT if value is None else format(degrees(value), form)
 
     return [
-        f"{point.omega_rad_s:.4f}",
-        f"{point.amplitude_factor:.4f}",
+        *_place(point),
         str(point.status),
         number(point.modulus, ".4f"),
         number(point.modulus_uncertainty, ".4f"),
@@ -143,7 +178,7 @@ def _cells(point: StabilityPoint) -> list[str]:
 
 def stability_figure(points: Sequence[StabilityPoint], curve: Curve) -> "Figure":
     """Modulus against frequency or amplitude, with the boundaries and their intervals, and the multipliers in the
-    complex plane; a filled marker is an unstable orbit.
+    complex plane; the marker of an unstable orbit is filled, that of a modulus not distinguishable from 1 half filled.
     """
     figure = new_figure(9.0, 3.8)
     left, right = figure.subplots(1, 2, width_ratios=(1.5, 1.0))
@@ -168,9 +203,8 @@ def _draw_moduli(panel: "Axes", points: Sequence[StabilityPoint], curve: Curve) 
         panel.axvspan(each.place - each.uncertainty, each.place + each.uncertainty, color=GREY, alpha=0.35, lw=0)
         label = "_" if number else "measured boundary (k = 2)"
         panel.axvline(each.place, color=GREY, linewidth=1.0, label=label)
-    known = [point for point in points if point.modulus is not None]
-    for unstable, label in ((False, "measured, stable"), (True, "measured, unstable")):
-        shown = [point for point in known if ((point.modulus or 0.0) > 1.0) is unstable]
+    for each, fill in FILLS.items():
+        shown = [point for point in points if stability(point) == each]
         if shown:
             panel.errorbar(
                 [point.amplitude_factor if over else point.omega_rad_s for point in shown],
@@ -178,10 +212,10 @@ def _draw_moduli(panel: "Axes", points: Sequence[StabilityPoint], curve: Curve) 
                 [point.modulus_uncertainty or 0.0 for point in shown],
                 fmt="o",
                 color=BLACK,
-                markerfacecolor=BLACK if unstable else "white",
                 markersize=5,
                 capsize=2,
-                label=label,
+                label=f"measured, {each}",
+                **fill,
             )
     panel.axhline(1.0, color=BLACK, linewidth=0.8)
     panel.set_xlabel("amplitude / uplift acceleration" if over else r"$\Omega$  [rad/s]")
@@ -196,10 +230,12 @@ def _draw_plane(panel: "Axes", points: Sequence[StabilityPoint], curve: Curve) -
     for ground, colour, dash in (("fixed", BLUE, "--"), ("table", VERMILLION, "-")):
         modulus, angle = curve[f"{ground}_modulus"], curve[f"{ground}_angle_rad"]
         panel.plot(modulus * np.cos(angle), modulus * np.sin(angle), color=colour, linestyle=dash, linewidth=1.4)
-    shown = [rect(point.modulus, point.angle_rad) for point in points if point.modulus and point.angle_rad]
-    for value in shown:
-        face = BLACK if abs(value) > 1.0 else "white"
-        panel.plot(value.real, value.imag, "o", color=BLACK, markerfacecolor=face, markersize=5)
+    shown = list[complex]()
+    for point in points:
+        if (found := stability(point)) is not None and point.modulus and point.angle_rad:
+            value = rect(point.modulus, point.angle_rad)
+            panel.plot(value.real, value.imag, "o", color=BLACK, markersize=5, **FILLS[found])
+            shown.append(value)
     if shown:
         centre = sum(shown) / len(shown)
         half = max(1.4 * max(abs(value - centre) for value in shown), 0.08)
@@ -221,8 +257,9 @@ def stability_sections(campaign: Campaign) -> list[Section]:
     curve = arrays(campaign.record.tables["prediction"])
     parts: list[Part] = [Listing([typeset(text) for text in boundary_texts(points, curve)])]
     caption = (
-        "Multipliers of the held orbits after their release (markers, k = 2; filled: unstable) and their prediction "
-        "(lines): modulus with the boundary and its interval, and the complex plane with the unit circle."
+        "Multipliers of the held orbits after their release (markers, k = 2; filled: unstable, half filled: modulus "
+        "not distinguishable from 1) and their prediction (lines): modulus with the boundary and its interval, and the "
+        "complex plane with the unit circle."
     )
     parts.append(Picture(stability_figure(points, curve), caption, "Multipliers against frequency or amplitude."))
     parts.append(_points_table(points))
@@ -232,14 +269,14 @@ def stability_sections(campaign: Campaign) -> list[Section]:
         each
         for point in points
         for each in budgeted(
-            f"{point.omega_rad_s:.4g} rad/s, {point.amplitude_factor:g}",
+            "{} rad/s, amplitude factor {}".format(*_place(point)),
             point.modulus,
             point.uncertainty_parts,
             point.modulus_uncertainty,
         )
     ]
     parts += budget_parts("|μ|", budgets)
-    remarks = [f"{point.omega_rad_s:g} rad/s: {point.reason}" for point in points if point.reason]
+    remarks = _remarks(points)
     return [Section("stability", "Stability of the rocking orbits", [*parts, *([Listing(remarks)] if remarks else [])])]
 
 
@@ -250,8 +287,7 @@ def _points_table(points: Sequence[StabilityPoint]) -> Table:
     turn = degrees(1.0)
     rows = [
         [
-            f"{point.omega_rad_s:.4g}",
-            f"{point.amplitude_factor:.4g}",
+            *_place(point),
             str(point.status),
             value(point.modulus, point.modulus_uncertainty),
             value(point.modulus_predicted, point.modulus_predicted_uncertainty),

@@ -2,7 +2,8 @@
 
 from collections.abc import Generator, Mapping
 from math import hypot
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -12,6 +13,9 @@ from bench.config.model import BenchConfiguration
 from bench.config.sections import Acquisition
 from bench.control.oscillator import Segment
 from bench.control.starts import Start
+from bench.datafile.tables import Column
+from bench.document.campaign import Campaign
+from bench.document.document import Listing, Table
 from bench.engine.steps import Done, Dwell, Measured, Outcome, Publish, Step
 from bench.events import Progress
 from protocols.common.sine.holding import prepared
@@ -20,7 +24,13 @@ from protocols.stability.plan import Place, StabilityPlan
 from protocols.stability.prediction import boundaries, close_pair, predicted, rocking
 from protocols.stability.protocol import OrbitStatus, StabilityParameters, StabilityPoint
 from protocols.stability.release import DEFLECTION, deflection
-from protocols.stability.results import boundary_texts, measured_boundaries
+from protocols.stability.results import (
+    boundary_texts,
+    measured_boundaries,
+    stability_figure,
+    stability_sections,
+    stability_table,
+)
 from sim.cycle_map import cycle_map
 from sim.errors import InvalidInput
 from sim.knowledge import SpecimenKnowledge
@@ -81,6 +91,40 @@ def test_without_a_boundary_the_text_states_what_was_found() -> None:
     texts = boundary_texts([point(15.0, 1.05), point(15.2, 1.03)], curve)
     assert texts[0] == "no boundary was crossed: every measured orbit is unstable"
     assert texts[1:] == ["predicted boundary on fixed ground: none in this range"]
+    near, far = point(12.5, 1.0004, 0.002), point(15.0, 1.05)
+    (first, _) = boundary_texts([near], curve)
+    assert first == "no boundary was crossed: every measured modulus is not distinguishable from 1 (k = 2)"
+    (first, _) = boundary_texts([near, far, point(15.2, 1.03)], curve)
+    assert first == (
+        "no boundary was crossed: 2 measured orbits are unstable, 1 modulus is not distinguishable from 1 (k = 2)"
+    )
+    figure = stability_figure([near, far], curve | {"fixed_angle_rad": np.ones(2), "table_angle_rad": np.ones(2)})
+    labels = {text.get_text() for text in figure.axes[0].get_legend().get_texts()}
+    assert labels == {
+        "predicted, fixed ground",
+        "measured, unstable",
+        "measured, not distinguishable from 1",
+    }
+
+
+def test_points_of_a_bisection_have_their_digits_in_table_and_remarks() -> None:
+    curve = {"omega_rad_s": np.array([15.25, 15.375]), "amplitude_factor": np.array([1.01, 1.01])}
+    curve |= {f"{ground}_modulus": np.array([1.01, 0.99]) for ground in ("fixed", "table")}
+    middle = point(15.3125, None).model_copy(update={"reason": "not captured"})
+    lines = stability_table([middle], curve).splitlines()
+    assert any(line.split()[:2] == ["15.3125", "1.0100"] for line in lines)
+    assert lines[-1] == "15.3125 rad/s, amplitude factor 1.0100: not captured"
+    columns = curve | {"fixed_angle_rad": np.ones(2), "table_angle_rad": np.ones(2)}
+    tables = {"prediction": {name: Column(values, "", "") for name, values in columns.items()}}
+    measured = point(15.28125, 1.01).model_copy(update={"uncertainty_parts": '{"noise": 0.001}'})
+    campaign = SimpleNamespace(
+        points=[middle.model_dump(), measured.model_dump()], record=SimpleNamespace(tables=tables)
+    )
+    (section,) = stability_sections(cast("Campaign", campaign))
+    rows = [row for part in section.parts if isinstance(part, Table) for row in part.rows]
+    assert ["15.2812", "1.0100"] in [row[:2] for row in rows]
+    assert "15.2812 rad/s, amplitude factor 1.0100" in [row[0] for row in rows]
+    assert section.parts[-1] == Listing([lines[-1]])
 
 
 def test_the_sensitivity_to_the_amplitude_and_the_uncertainty_of_a_prediction() -> None:
