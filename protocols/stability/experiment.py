@@ -76,8 +76,10 @@ class StabilityTest(Prepared[StabilityParameters]):
             amplitude = place.factor * self._specimen.uplift_acceleration
             orbit = rocking(self._specimen, place.omega, amplitude)
             if orbit is None:
+                over = len(self.parameters.amplitude_factor) > 1
                 raise InvalidInput(
-                    "omega", place.omega, "the model has no rocking orbit at this frequency and amplitude"
+                    *(("amplitude_factor", place.factor) if over else ("omega", place.omega)),
+                    "the model has no rocking orbit at this frequency and amplitude",
                 )
             found[place] = plan_starts(
                 self._specimen, place.omega, amplitude, orbit, self.parameters.starts, self.configuration.known

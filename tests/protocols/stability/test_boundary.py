@@ -182,6 +182,19 @@ def test_a_bench_whose_corrections_come_too_late_is_refused() -> None:
         StabilityTest(StabilityParameters(), slow)
 
 
+@pytest.mark.parametrize(
+    ("points", "field", "value"),
+    [({"amplitude_factor": (0.1, 0.2)}, "amplitude_factor", 0.1), ({"amplitude_factor": (0.1,)}, "omega", 4.0)],
+)
+def test_a_planned_point_without_rocking_orbit_is_refused_by_the_varied_parameter(
+    points: dict[str, Any], field: str, value: float
+) -> None:
+    parameters = StabilityParameters.model_validate({"omega": (4.0,), **points})
+    with pytest.raises(InvalidInput, match="no rocking orbit") as refused:
+        _ = StabilityTest(parameters, BenchConfiguration()).starts
+    assert (refused.value.item, refused.value.value) == (field, value)
+
+
 def test_the_bisection_takes_the_middle_of_the_widest_bracket() -> None:
     parameters = StabilityParameters(omega=(15.0, 15.2, 15.6, 16.0), bracket=0.01)
     plan = StabilityPlan(parameters, BenchConfiguration(), {})
