@@ -6,10 +6,10 @@ from math import tau
 
 import numpy as np
 
-from bench.analysis.cycles import Cycle, CycleAnalyser, mean_amplitude
+from bench.analysis.cycles import Cycle, CycleAnalyser
 from bench.analysis.free_motion import CYCLES, KEPT, Rate, free_motion, orbit_peak
 from bench.analysis.gain import steady_peak
-from bench.analysis.signals import ACCELERATION, SIGNALS
+from bench.analysis.signals import SIGNALS
 from bench.analysis.steady import SteadyDetector
 from bench.analysis.unsteady_peaks import unsteady_peaks
 from bench.config.model import BenchConfiguration
@@ -171,7 +171,7 @@ class HarmonicFollower:
         sensors = checked(self._configuration.sensors, self._bare.values())
         shaker = self._configuration.simulated_shaker
         harmonics = self._parameters.harmonics
-        tried = min(self._tries, key=lambda series: self._unlike(series, point))
+        tried = self._tried(point)
         settled = self._settled(tried)
         held = None if tried.held is None else self._held(tried.held, point)
         conditions = Conditions(omega, specimen, known, bare, sensors, shaker, harmonics)
@@ -179,16 +179,12 @@ class HarmonicFollower:
         found = with_free_prediction(found, specimen, self._amplitude, self._configuration, harmonics)
         return found.model_copy(update={"start_chance": point.start_chance})
 
-    def _unlike(self, series: _Series, point: HarmonicPoint) -> float:
-        """Difference between the table amplitudes of a dwell and of a point [m/s2]; it is smallest for the dwell of the
-        point.
+    def _tried(self, point: HarmonicPoint) -> _Series:
+        """The dwell of a point among those without a fall, by the rule of the plan: the last one ended the tries, or
+        all starts were tried and the first one is reported.
         """
-        if point.status is PointStatus.HELD:
-            # the amplitude of a held point was measured during the hold
-            series = series.held or series
-        cycles = series.recent if series.hold else series.measured
-        used = cycles[-self._parameters.measured_cycles :]
-        return abs(mean_amplitude(used, ACCELERATION) - (point.amplitude_m_s2 or 0.0))
+        ended = point.status in (PointStatus.STEADY, PointStatus.HELD) or not point.predicted_stable
+        return self._tries[-1 if ended else 0]
 
     def _held(self, series: _Series, point: HarmonicPoint) -> Held:
         """The hold of a point, evaluated from its last cycles, with control and capture as recorded."""

@@ -102,6 +102,31 @@ def test_the_same_settings_come_to_the_same_results_in_a_file_beside_the_old(
         assert json.loads(file["entry/process/used"][()])["peak"] == "judged"
 
 
+def test_the_first_of_two_modulated_motions_is_analysed_again(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is the recorded one, although the last cycles of the second one are nearer to its mean amplitude."""
+
+    def planned(_specimen: Specimen, omega: float, amplitude: float, *_: object) -> tuple[Start, ...]:
+        end = Segment(1.0, amplitude, omega)
+        return Start("strong", (Segment(2.0, 1.8 * amplitude, omega), end), 0.5), Start("ramp", (end,), 0.5)
+
+    monkeypatch.setattr("protocols.harmonic.campaign.plan_starts", planned)
+    asked = ASKED.model_copy(update={"settle_limit": 10.0, "settle_tolerance": 1e-4, "hold": False})
+    rig = SimulatedRig(BENCH.simulation.bench, BENCH.specimen, seed=1, lead=BENCH.lead_samples)
+    metadata = {"protocol": "harmonic", "parameters": asked.model_dump_json()}
+    path = tmp_path / "campaign.h5"
+    assert (
+        recorded(path, HarmonicCampaign(asked, BENCH).plan(), rig, BENCH, HarmonicPoint, metadata).status == "completed"
+    )
+    with open_datafile(path) as record:
+        (stored,) = record.points
+    assert (stored["status"], stored["starts_tried"], stored["predicted_stable"]) == ("modulated", 2, True)
+    again = _analysed(path, capsys)
+    for name in ("alpha_2", "amplitude_m_s2", "settle_time_s", "cycles_measured"):
+        assert again[name] == stored[name]
+
+
 def test_cycles_and_harmonics_are_those_that_were_asked_for(campaign: Path, capsys: pytest.CaptureFixture[str]) -> None:
     point = _analysed(campaign, capsys, "measured_cycles=5", "harmonics=1", "peak=mean")
     assert point["cycles_measured"] == 5
