@@ -233,8 +233,8 @@ class HarmonicSettings(Parameters):
     measured_cycles: int | None = quantity(
         None,
         "1",
-        "number of cycles evaluated at the end of each dwell, at most those after the last change of its drive; if "
-        "absent, as in the campaign",
+        "number of cycles evaluated at the end of each dwell, at most those after the last change of its drive, and "
+        "of a hold at most those of the campaign or 24, whichever are more; if absent, as in the campaign",
         ge=4,
         le=10000,
     )

@@ -20,6 +20,7 @@ from bench.engine.steps import Arm, Calibrate, Dwell, Measured, Outcome, Publish
 from bench.events import Acquired, Event, PointFinished, StepStarted
 from bench.live_values import Estimate
 from bench.replay.session import stored_configuration
+from protocols.common.sine.holding import collected
 from protocols.common.sine.settling import (
     JUDGED,
     LASERS,
@@ -190,7 +191,9 @@ class HarmonicFollower:
         """The hold of a point, evaluated from its last cycles, with control and capture as recorded."""
         if point.status is not PointStatus.HELD:
             return Held(None, "as recorded", cycles=len(series.recent))
-        omega, used = series.sine.omega, series.recent[-self._cycles :]
+        # earlier cycles may be from before the capture or the last correction of the table
+        certain = collected(self._parameters.measured_cycles)
+        omega, used = series.sine.omega, series.recent[-min(self._cycles, certain) :]
         table = SineResponse.of(used, series.sine, series.turn or 1.0 + 0.0j)
         return Held(
             peak=unsteady_peaks(used, omega).greatest if self._settings.peak == "largest" else steady_peak(used, omega),

@@ -95,6 +95,13 @@ def prepared(orbit: Orbit | None, shaker: Shaker | None, harmonics: int) -> Stab
         return None
 
 
+def collected(measured_cycles: int) -> int:
+    """Number of cycles at the end of a hold from which its motion is judged and `measured_cycles` are taken. They
+    follow the capture and the last correction of the table.
+    """
+    return max(measured_cycles, 2 * WINDOW)
+
+
 def too_late(configuration: BenchConfiguration, omega: float) -> str | None:
     """Reason why a motion at `omega` [rad/s] cannot be held: corrections would take effect more than `DELAY` cycles
     after the measured cycle. None if it can be held.
@@ -232,7 +239,7 @@ class Hold:
         self._control = SineControl(parameters.harmonics, Tolerance(*(AIM * each for each in tolerances)))
         jitter = sine.omega * accuracy.laser_timing
         self._detector = SteadyDetector(parameters.settle_tolerance, JUDGED, LASERS, jitter)
-        self._wanted = max(parameters.measured_cycles, 2 * WINDOW)
+        self._wanted = collected(parameters.measured_cycles)
         self._controls: deque[complex] = deque([0j] * (DELAY + 1), maxlen=DELAY + 1)
         self._used: deque[tuple[Cycle, float]] = deque(maxlen=self._wanted)
         self._since = 0

@@ -80,6 +80,16 @@ def test_the_file_replays_to_the_last_bit_and_its_hold_is_analysed_again(
     replayed_and_analysed(folder / "campaign.h5", held, capsys)
 
 
+def test_more_cycles_are_not_taken_from_before_the_capture(
+    held: dict[str, Any], folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert held["captured_cycles"] > 24
+    assert main(["analyse", str(folder / "campaign.h5"), "--json", "--set", "measured_cycles=200"]) == 0
+    (again,) = json.loads(capsys.readouterr().out)["points"]
+    assert again["cycles_measured"] == 24
+    assert again["alpha_2"] == pytest.approx(held["alpha_2"], rel=2e-3)
+
+
 def test_the_multiplier_is_measured_after_the_release(held: dict[str, Any]) -> None:
     assert held["multiplier"] == pytest.approx(held["table_multiplier"], abs=max(0.005, held["multiplier_uncertainty"]))
     assert np.degrees(held["multiplier_angle_rad"]) == pytest.approx(166.0, abs=1.5)
