@@ -58,7 +58,7 @@ def check_whole(entry: hdf5.Group, counted: Mapping[str, int], size: int) -> Non
 FORMAT, FORMAT_VERSION = "rocking-bench record", 2
 """Name and version of the format of a campaign file."""
 
-WORDING = 10
+WORDING = 11
 """Version of the sentences in journal and results. Replay compares these sentences only with those of a file of the
 same version.
 """

@@ -157,7 +157,7 @@ def attractors_table(found: Sequence[LongTerm]) -> Table:
             f"{name}_{end}": numbers(
                 [values[k] for values in ends],
                 "1",
-                f"{side} value of alpha_2_{name} among the drawn specimens",
+                f"{side} value of alpha_2_{name} among the drawn specimens whose block does not fall",
             )
             for k, name in enumerate(("least", "mean", "greatest"))
             for end, side, ends in (

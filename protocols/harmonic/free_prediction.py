@@ -15,6 +15,11 @@ from sim.steady import NoOrbit
 MEMBERS = attractors.MEMBERS
 """Number of specimens drawn, within the uncertainty, for the ranges of the peaks."""
 
+FEWEST = 20
+"""Smallest number of drawn specimens whose block does not fall with which peaks are compared with the ranges: a further
+one lies within a range of 20 with 90 %, of fewer with less.
+"""
+
 PEAKS = ("least", "mean", "greatest")
 
 
@@ -33,16 +38,16 @@ def with_free_prediction(
     if found is None:
         return point
     fields: dict[str, Any] = {"repeats_predicted": found["repeats"] or None, "falls_predicted": found["falls"]}
-    outside = list[str]()
+    outside, compared = list[str](), _survivors(found) >= FEWEST
     for name, low, high in zip(PEAKS, found["low"], found["high"], strict=True):
         fields[f"alpha_2_{name}_predicted"] = found[name]
         fields[f"alpha_2_{name}_low"], fields[f"alpha_2_{name}_high"] = low, high
         measured, uncertainty = (getattr(point, f"alpha_2_{name}{end}") for end in ("", "_uncertainty"))
         # the prediction is for the requested amplitude, to which the peaks are assumed to be proportional
         doubt = hypot(uncertainty, 2.0 * configuration.sensors.table_scale * measured)
-        if low is not None and not low - doubt <= measured <= high + doubt:
+        if compared and low is not None and not low - doubt <= measured <= high + doubt:
             outside.append(name)
-    fields["free_agrees"] = None if found["low"][0] is None else not outside
+    fields["free_agrees"] = not outside if compared else None
     reason = "; ".join(filter(None, (point.reason, _remark(found, outside))))
     return point.model_copy(update=fields | {"reason": reason})
 
@@ -86,6 +91,11 @@ def _numbers(motion: LongTerm) -> dict[str, Any]:
     }
 
 
+def _survivors(found: dict[str, Any]) -> int:
+    """Number of drawn specimens whose block does not fall, which give the ranges; 0 if none was drawn."""
+    return 0 if found["falls"] is None else round((1.0 - found["falls"]) * MEMBERS)
+
+
 def _remark(found: dict[str, Any], outside: list[str]) -> str:
     names = " and ".join(outside) if len(outside) < 3 else "least, mean and greatest"
     apart = f"; outside the predicted ranges: the measured {names} peak{'s' * (len(outside) > 1)}" if outside else ""
@@ -95,5 +105,9 @@ def _remark(found: dict[str, Any], outside: list[str]) -> str:
     text = f"the model's free motion {repeats}, with peaks up to alpha_2 = {found['greatest']:.3f}"
     low, high = found["low"][-1], found["high"][-1]
     if low is not None:
-        text += f" ({low:.3f} to {high:.3f} among {MEMBERS} specimens within the uncertainty)"
+        number = _survivors(found)
+        among = f"{MEMBERS} specimens within the uncertainty"
+        if number < MEMBERS:
+            among = f"the {number} of {among} whose block does not fall"
+        text += f" ({low:.3f} to {high:.3f} among {among}{', too few for a comparison' * (number < FEWEST)})"
     return text + apart

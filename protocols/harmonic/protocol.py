@@ -74,8 +74,8 @@ def _end_of_range(side: str, name: str) -> Any:
     return quantity(
         None,
         "1",
-        f"{side} end of the range of alpha_2_{name}_predicted among drawn specimens, which contains that of a specimen "
-        "within the uncertainty with 95 %",
+        f"{side} end of the range of alpha_2_{name}_predicted among the drawn specimens whose block does not fall; a "
+        "range of n of them contains that of a further one with the probability (n - 1) / (n + 1), 95 % for all 39",
     )
 
 
@@ -148,7 +148,8 @@ class HarmonicPoint(Parameters):
     free_agrees: bool | None = quantity(
         None,
         "1",
-        "whether least, mean and greatest peak are all within the predicted ranges, each widened by its uncertainty",
+        "whether least, mean and greatest peak are all within the predicted ranges, each widened by its uncertainty; "
+        "absent if fewer than 20 of the drawn specimens give the ranges",
     )
     alpha_2_orbit: float | None = quantity(
         None, "1", "gain of the orbit about which an unsteady motion revolves, from the mean cycle of the motion"

@@ -35,18 +35,38 @@ def free(greatest: float, multiplier: float | None = 1.046) -> HarmonicPoint:
 def test_the_peaks_are_compared_with_the_ranges_of_the_specimens(
     greatest: float, agrees: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(free_prediction, "MEMBERS", 12)
+    monkeypatch.setattr(free_prediction, "MEMBERS", 21)
     found = with_free_prediction(free(greatest), SPECIMEN, AMPLITUDE, CONFIGURATION, 5)
     # the attractor on fixed ground was computed elsewhere: nine cycles, peaks up to 0.862; the table adds little
     assert found.alpha_2_greatest_predicted == pytest.approx(0.862, rel=0.01)
     assert found.repeats_predicted == 9
     assert found.free_agrees is agrees
+    number = round(21 * (1.0 - (found.falls_predicted or 0.0)))
+    among = "21" if number == 21 else f"the {number} of 21"
+    assert f"among {among} specimens within the uncertainty" in found.reason
     assert found.reason.startswith("not steady; the model's free motion repeats every 9 cycles")
     assert found.reason.endswith("outside the predicted ranges: the measured greatest peak") is not agrees
     for name in ("least", "mean", "greatest"):
         low, predicted, high = (getattr(found, f"alpha_2_{name}_{end}") for end in ("low", "predicted", "high"))
         assert low < high
         assert predicted is not None
+
+
+@pytest.mark.parametrize(("falls", "left", "agrees"), [(0, 39, False), (19, 20, False), (20, 19, None), (39, 0, None)])
+def test_specimens_whose_block_falls_are_not_counted_in_the_range(
+    falls: int, left: int, agrees: bool | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With fewer than 20 others, the peaks are not compared with it."""
+    end = None if left < 2 else 1.0
+    predicted = {"least": 0.48, "mean": 0.7, "greatest": 0.86, "repeats": 9, "falls": falls / 39}
+    predicted |= {"low": [end and 0.4] * 3, "high": [end and 0.9] * 3}
+    monkeypatch.setattr(free_prediction, "_predicted", lambda *_: predicted)
+    found = with_free_prediction(free(4.0), SPECIMEN, AMPLITUDE, CONFIGURATION, 5)
+    assert found.free_agrees is agrees
+    assert ("the measured greatest peak" in found.reason) is (agrees is False)
+    assert ("specimens within the uncertainty" in found.reason) is (left > 0)
+    assert (f"among the {left} of 39 specimens within the uncertainty whose block" in found.reason) is (0 < left < 39)
+    assert ("too few for a comparison" in found.reason) is (left == 19)
 
 
 @pytest.mark.parametrize("multiplier", [None, 0.999])
