@@ -10,7 +10,7 @@ import signal
 import socket
 import sys
 import threading
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager, suppress
 from types import FrameType
 from typing import TYPE_CHECKING, NoReturn
@@ -31,6 +31,15 @@ ORDERLY = 0.4
 SIGNALS = tuple(
     signal.Signals[name] for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK") if name in signal.Signals.__members__
 )
+
+
+def _handled() -> Iterator[signal.Signals]:
+    """The signals to handle: all, except a SIGHUP that is ignored, because a program started with nohup must outlast
+    its terminal.
+    """
+    for number in SIGNALS:
+        if number.name != "SIGHUP" or signal.getsignal(number) is not signal.SIG_IGN:
+            yield number
 
 
 class Interrupts:
@@ -106,7 +115,7 @@ def interruptible(requests: "Requests", asking: Callable[[], bool]) -> Generator
     if threading.current_thread() is not threading.main_thread():
         yield interrupts
         return
-    before = {number: signal.signal(number, interrupts) for number in SIGNALS}
+    before = {number: signal.signal(number, interrupts) for number in _handled()}
     try:
         yield interrupts
     finally:
@@ -206,10 +215,8 @@ def handle_signals(interrupts: Interrupts) -> None:
     _watch = Watch()
     _watch.start()
     watch_console()
-    for number in SIGNALS:
-        # a program started with nohup must continue
-        if number.name != "SIGHUP" or signal.getsignal(number) is not signal.SIG_IGN:
-            signal.signal(number, interrupts)
+    for number in _handled():
+        signal.signal(number, interrupts)
 
 
 def interrupted_text(text: str = "interrupted", otherwise: str = "") -> str:
@@ -253,7 +260,7 @@ def until_interrupted() -> Generator[threading.Event]:
     def handle(number: int, frame: FrameType | None) -> None:  # noqa: ARG001 - the signature is Python's
         over.set()
 
-    before = {number: signal.signal(number, handle) for number in SIGNALS}
+    before = {number: signal.signal(number, handle) for number in _handled()}
     try:
         yield over
     finally:

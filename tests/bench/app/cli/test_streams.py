@@ -3,6 +3,7 @@
 import errno
 import json
 import os
+import signal
 import subprocess
 import sys
 from collections.abc import Generator
@@ -11,10 +12,11 @@ from pathlib import Path
 
 import pytest
 
+from bench.app.cli.interrupt import until_interrupted
 from bench.app.cli.main import main
 from bench.app.cli.streams import lasting
 from tests.installed import example
-from tests.patience import LONG
+from tests.patience import LONG, eventually
 
 RUN = ["run", "tone-sweep", "--omega", "40", "--cycles", "4"]
 """The shortest run that is measured, evaluated and drawn."""
@@ -85,6 +87,44 @@ def test_a_command_whose_standard_error_is_gone_ends_well(how: str, tmp_path: Pa
             os.close(handle)
     assert done.returncode == 0
     assert json.loads(done.stdout)["status"] == "completed"
+
+
+NOHUP = """
+import signal
+from bench.app.cli.process import run
+
+signal.signal(signal.SIGHUP, signal.SIG_IGN)
+run()
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="there is no SIGHUP")
+def test_a_run_started_with_nohup_outlasts_its_terminal(tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    options = ["--omega", "12", "18", "27", "40", "--cycles", "4", "--yes", "--out", str(out), "--json"]
+    process = subprocess.Popen([sys.executable, "-c", NOHUP, "check", *options], stdout=subprocess.PIPE)
+    try:
+        eventually((out / "campaign.h5").exists)
+        process.send_signal(signal.SIGHUP)
+        answer, _ = process.communicate(timeout=LONG)
+    finally:
+        process.kill()
+    assert (process.returncode, json.loads(answer)["status"]) == (0, "completed")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="there is no SIGHUP")
+@pytest.mark.parametrize("ignored", [True, False])
+def test_a_server_started_with_nohup_outlasts_its_terminal(ignored: bool) -> None:
+    # default_int_handler instead of SIG_DFL, which would end the tests if nothing replaced it
+    inherited = signal.SIG_IGN if ignored else signal.default_int_handler
+    before = signal.signal(signal.SIGHUP, inherited)
+    try:
+        with until_interrupted() as over:
+            signal.raise_signal(signal.SIGHUP)
+            assert over.is_set() is not ignored
+        assert signal.getsignal(signal.SIGHUP) is inherited
+    finally:
+        signal.signal(signal.SIGHUP, before)
 
 
 def test_a_result_that_cannot_be_printed_is_one_line(tmp_path: Path) -> None:
