@@ -141,6 +141,16 @@ def _check_for_queue(options: RunOptions) -> None:
     if options.profile is not None:
         allowed = "a queue runs its tests with the profile of its configuration: set the keys of the profile there"
         raise InvalidInput("--profile", options.profile, allowed)
+    if options.seed is not None:
+        allowed = (
+            "the tests of a queue have one seed: give it to `rockbench queue`, or set the key simulation.seed there"
+        )
+        raise InvalidInput("--seed", options.seed, allowed)
+    if options.specimen is not None:
+        allowed = (
+            "the tests of a queue have one specimen: give it to `rockbench queue`, or set the key specimen_file there"
+        )
+        raise InvalidInput("--specimen", str(options.specimen), allowed)
     if options.yes and options.ask:
         raise InvalidInput("--yes", "--ask", "the two options contradict each other; use one of them")
 

@@ -18,11 +18,13 @@ from bench.app.cli.main import main
 from bench.app.preflight import DiskSpace, Preflight
 from bench.app.queue.file import LEFT, Owner, QueueFile
 from bench.app.queue.queue import OPEN, Queue, Queued, Stage
+from bench.config.result_files import write_specimen
 from bench.engine.interface import Requests, Unattended
 from bench.preflight.margins import Forecast
 from drivers.rig import RigError
 from protocols.harmonic.protocol import HarmonicParameters
 from sim.errors import InvalidInput
+from sim.identified import Identified
 from tests.command_line import FakeSession, main_with
 
 ROOT = Path(__file__).parents[4]
@@ -395,11 +397,18 @@ def test_a_test_that_has_run_is_told_even_if_the_file_was_changed_meanwhile(
 
 @pytest.mark.parametrize(
     ("options", "item"),
-    [(["--dry-run"], "--dry-run"), (["--profile", "fast"], "--profile"), (["--yes", "--ask"], "--yes")],
+    [
+        (["--dry-run"], "--dry-run"),
+        (["--profile", "fast"], "--profile"),
+        (["--seed", "7"], "--seed"),
+        (["--specimen", "specimen.json"], "--specimen"),
+        (["--yes", "--ask"], "--yes"),
+    ],
 )
 def test_options_that_a_test_in_a_queue_cannot_have_are_refused(
     session: FakeSession, capsys: pytest.CaptureFixture[str], options: list[str], item: str
 ) -> None:
+    write_specimen(Path("specimen.json"), Identified())
     assert main_with(session, ["run", "harmonic", "--queue", "queue.json", *options]) == 2
     assert f"{item} = " in capsys.readouterr().err
     assert not Path("queue.json").exists()
