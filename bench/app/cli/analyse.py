@@ -53,7 +53,8 @@ def analyse(
         Parameter(
             name="--config",
             metavar="FILE",
-            help="Configuration (TOML) whose tables analysis, specimen and uncertainty replace the recorded ones.",
+            help="Configuration (TOML) whose tables analysis, specimen and uncertainty, and whose specimen_file if it "
+            "has one, replace the recorded ones.",
         ),
     ] = None,
     specimen: Annotated[

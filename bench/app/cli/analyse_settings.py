@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 from bench.figures.text_table import TextColumn, text_table
 from sim.errors import InvalidInput
+from sim.identified import spring_name
 from sim.parameters import Parameters
 
 if TYPE_CHECKING:
@@ -59,7 +60,7 @@ def choice_of(record: "DataFile", changes: Sequence[str], config: Path | None, s
     protocol, recorded = protocol_of(record), stored_configuration(record)
     asked, reanalysis = parameters_of(record, protocol), protocol.reanalysis
     data: dict[str, Any] = recorded.model_dump(mode="json")
-    given = _from_file(config, data) if config is not None else {}
+    given = _from_file(config, recorded) if config is not None else {}
     if specimen is not None:
         from bench.config.result_files import read_specimen
 
@@ -153,11 +154,22 @@ def _require_known(own: Mapping[str, Any], kind: type[Parameters]) -> None:
             raise InvalidInput(f"--set {key}", value, f"{nearest}the keys are {known}, and {tables}: {LIST}")
 
 
-def _from_file(config: Path, data: Mapping[str, Any]) -> dict[str, Any]:
-    """The sections of a configuration file that differ from the recorded ones."""
+def _from_file(config: Path, recorded: "BenchConfiguration") -> dict[str, Any]:
+    """The sections of a configuration file that differ from the recorded ones.
+
+    A file without identified properties keeps the recorded ones, except those whose assumed values it changes.
+    """
     from bench.config.toml import read_configuration
 
-    other = read_configuration(config).model_dump(mode="json")
+    read = read_configuration(config)
+    if read.identified is None and recorded.identified is not None:
+        groups = ((read.specimen.frame, recorded.specimen.frame), (read.specimen.block, recorded.specimen.block))
+        changed = [
+            name for new, old in groups for name in new.model_fields_set if getattr(new, name) != getattr(old, name)
+        ]
+        changed += [spring_name(each.label) for each in read.specimen.springs if each not in recorded.specimen.springs]
+        read = read.model_copy(update={"identified": recorded.identified.without(*changed)})
+    other, data = read.model_dump(mode="json"), recorded.model_dump(mode="json")
     return {name: other[name] for name in (*SECTIONS, "identified") if other[name] != data[name]}
 
 

@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from datetime import UTC, datetime
 from hashlib import sha256
 from math import tau
 from pathlib import Path
@@ -10,8 +11,10 @@ import h5py
 import numpy as np
 import pytest
 
+from bench.app.cli.analyse_settings import choice_of
 from bench.app.cli.main import main
 from bench.config.model import BenchConfiguration
+from bench.config.result_files import write_specimen
 from bench.config.sections import Acquisition, Simulation
 from bench.control.oscillator import Segment
 from bench.control.starts import Start
@@ -21,6 +24,7 @@ from drivers.simulated import SimulatedRig
 from protocols.harmonic.campaign import HarmonicCampaign
 from protocols.harmonic.protocol import HarmonicParameters, HarmonicPoint
 from sim.gain import predict_gain
+from sim.identified import Finding, Identified
 from sim.specimen import Frame, Specimen
 from sim.virtual_bench import VirtualBenchParameters
 from tests.recorded import recorded
@@ -173,6 +177,33 @@ def test_accuracies_and_specimen_are_those_that_were_given(
     shown = json.loads(capsys.readouterr().out)
     assert shown["points"] == [point]
     assert set(shown["settings"]) == {"analysis", "specimen"}
+
+
+def test_a_configuration_without_a_specimen_file_keeps_what_was_identified(
+    campaign: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = {"k1": 210.0, "k2": 55.0, "restitution_factor": 0.97, "k_c:0.25": 54.0}
+    findings = tuple(
+        Finding(name=name, value=value, standard_uncertainty=0.01 * value, source="test", date=datetime.now(UTC))
+        for name, value in found.items()
+    )
+    known = BENCH.model_copy(update={"identified": Identified(findings=findings)})
+    monkeypatch.setattr("bench.replay.session.stored_configuration", lambda _record: known)
+    bench, specimen = tmp_path / "bench.toml", tmp_path / "specimen.json"
+
+    def left(text: str) -> tuple[str, ...]:
+        bench.write_text(text)
+        with open_datafile(campaign) as record:
+            identified = choice_of(record, (), bench).changed.identified
+        return () if identified is None else identified.names
+
+    assert left("[analysis]\nlaser_linearity = 0.0\n") == tuple(found)
+    # an assumed value that the file changes replaces the identified one, an unchanged one does not
+    frame = f"[specimen.frame]\nk1 = {BENCH.specimen.frame.k1}\nk2 = 60.0\n"
+    assert left(frame) == ("k1", "restitution_factor", "k_c:0.25")
+    assert left("[[specimen.springs]]\nlabel = 0.25\nk_c = 53.0\n") == ("k1", "k2", "restitution_factor")
+    write_specimen(specimen, Identified(findings=findings[:1]))
+    assert left('specimen_file = "specimen.json"\n') == ("k1",)
 
 
 def test_results_that_do_not_come_again_are_no_ground_for_others(
