@@ -199,6 +199,9 @@ def _early_end(record: DataFile, over: str | None) -> str | None:
     """Text that states where and why the recording ends before the end of its plan; None if the plan ended."""
     if record.status == UNFINISHED:
         return f"{over or 'the file ends'}: the program that wrote the file was killed, or is still writing"
+    if record.status == "interrupted":
+        # a recovered file may end without a lack of samples, for example at a question to the operator
+        over = over or "the file ends"
     if over is None or record.status not in ("failed", "halted", "interrupted"):
         return None
     return f"{over}: the run ended there ({record.status}), {record.summary}"

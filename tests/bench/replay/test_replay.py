@@ -301,6 +301,39 @@ def test_a_killed_program_leaves_what_replays_up_to_there(path: Path) -> None:
     assert (replayed.played, replayed.rows) == (1600, rows)
 
 
+@pytest.mark.parametrize(("status", "said"), [("running", "killed"), ("interrupted", "recovered")])
+def test_a_program_killed_during_a_question_replays_up_to_it_with_or_without_recovery(
+    path: Path, status: str, said: str
+) -> None:
+    with h5py.File(path, "r+") as file:
+        entry = file["entry"]
+        kinds = [kind.decode() for kind in entry["events/kind"][:]]
+        asked = [index for index, kind in enumerate(kinds) if kind == "OperatorAsked"][1]
+        runs = entry["instrument/blocks/run"][:]
+        blocks = int((runs == runs[0]).sum())
+        parts = entry["complete"].attrs["parts"].split()
+        ends = {
+            "samples": entry["instrument/blocks/row"][blocks],
+            "blocks": blocks,
+            "events": asked + 1,
+            "state_changes": kinds[:asked].count("StateChanged"),
+            "operator_requests": 2,
+            **dict.fromkeys(("points", "estimates", "alignments", "operator_answers", "operator_actions"), 1),
+        }
+        for part, end in ends.items():
+            entry["complete"][parts.index(part)] = end
+        entry["status"][()] = status.encode()
+        entry["summary"][()] = b"recovered from the data on the disk"
+    replayed = played(path)
+    assert replayed.found.differences == []
+    assert said in str(replayed.ended)
+    assert (len(replayed.points), replayed.found.compared[JOURNAL]) == (1, asked + 1)
+    # it is compared as far as it goes
+    _changed(path, "points/peak", 0, 1.01)
+    _changed(path, "events/text", 3, "nobody knows")
+    assert {each.part for each in played(path).found.differences} == {JOURNAL, POINTS}
+
+
 def _changed(path: Path, dataset: str, row: int, value: object) -> None:
     with h5py.File(path, "r+") as file:
         file["entry"][dataset][row] = value
