@@ -138,7 +138,9 @@ def run_session(
         held.close()
     with plugin_code(name):
         result = result_of(engine.returned, prepared, stream.points)
-    figures = [out / file for file in protocol.figures if file in result.figures]
+    # no figures are drawn after an interrupt; `rockbench report` draws them from the file
+    drawn = () if requests.interrupted else protocol.figures
+    figures = [out / file for file in drawn if file in result.figures]
     summary = Summary(
         protocol=protocol.name,
         status=ending.status,
@@ -161,7 +163,6 @@ def run_session(
             if file in result.files:
                 result.files[file](out / file)
     if not requests.interrupted:
-        # no figures are drawn after an interrupt; `rockbench report` draws them from the file
         with requests.without_rig(), plugin_code(name, files=True):
             progress("drawing the figures")
             for path in figures:

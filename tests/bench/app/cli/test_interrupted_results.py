@@ -1,6 +1,8 @@
 """An interrupt just before and after a result gets its name: nothing is left, or a whole file is kept and named."""
 
+import json
 import os
+import signal
 import subprocess
 import sys
 from collections.abc import Callable
@@ -9,6 +11,8 @@ from pathlib import Path
 import pytest
 
 from bench.app.cli.main import main
+from bench.datafile.recorder import Recorder
+from bench.events import Event, PointFinished
 from tests.interrupts import COMMANDS, misjudged
 from tests.patience import LONG
 from tests.whole import partial
@@ -58,6 +62,24 @@ def test_an_older_file_of_the_name_is_not_the_result(tmp_path: Path, monkeypatch
     with pytest.raises(KeyboardInterrupt):
         write_new(out, lambda path: path.write_text("new") and None, overwrite=True)
     assert (completed(), out.read_text(), [*tmp_path.iterdir()]) == ([], "older", [out])
+
+
+def test_an_interrupted_run_names_no_figures_that_were_not_drawn(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    class Interrupted(Recorder):
+        def __call__(self, event: Event) -> None:
+            super().__call__(event)
+            if isinstance(event, PointFinished):
+                signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr("bench.app.session.Recorder", Interrupted)
+    out = tmp_path / "run"
+    assert main(["check", "--omega", "12", "18", "27", "40", "--cycles", "4", "--out", str(out), "--json"]) == 130
+    shown, kept = json.loads(capsys.readouterr().out), json.loads((out / "summary.json").read_text(encoding="utf-8"))
+    assert not [path.name for path in out.iterdir() if path.suffix in (".png", ".pdf", ".svg")]
+    for summary in (shown, kept):
+        assert (summary["figure"], summary.get("further_figures"), len(summary["points"]) > 0) == (None, None, True)
 
 
 HANGING = """
