@@ -80,6 +80,7 @@ def _run(
     protocol: "Protocol[Any]", typed: Mapping[str, Any], options: RunOptions, page: PageOptions, progress: Progress
 ) -> int:
     progress("reading protocol and bench")
+    _check_texts(options)
     if not options.watch and page != PageOptions():
         raise InvalidInput("--watch", None, "--address, --port and --no-token need the live page: add --watch")
     if options.watch and (options.dry_run or options.queue is not None):
@@ -132,6 +133,21 @@ def _run(
         report_error(ended)
         return interrupted or 1
     return _print_result(ended, out, options.json, interrupted)
+
+
+def _check_texts(options: RunOptions) -> None:
+    """Raise InvalidInput for a text that the data file cannot store: Python represents bytes of an argument that are
+    not UTF-8 as surrogates.
+    """
+    for item, text in (("--operator", options.operator), *(("--note", note) for note in options.note)):
+        try:
+            text.encode()
+        except UnicodeEncodeError as error:
+            place = f"character {error.start + 1} is not"
+            allowed = (
+                f"it must be UTF-8, and {place}: use a terminal and scripts with this encoding, or omit the character"
+            )
+            raise InvalidInput(item, text, allowed) from None
 
 
 def _check_for_queue(options: RunOptions) -> None:

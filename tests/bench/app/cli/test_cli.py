@@ -216,6 +216,16 @@ def test_ctrl_c_aborts_then_halts_and_ends_with_130(session: FakeSession, capsys
     assert "run halted" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("item", ["--operator", "--note"])
+def test_a_text_that_is_not_utf_8_is_refused_at_once(item: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    # as Python passes the Latin-1 bytes of "Müller"
+    assert main(["check", item, "M\udcfcller", "--out", str(tmp_path / "run"), "--json"]) == 2
+    shown = capsys.readouterr()
+    assert f"{item} = 'M\\udcfcller' is refused: it must be UTF-8, and character 2 is not" in shown.err
+    assert json.loads(shown.out)["error"]["item"] == item
+    assert not (tmp_path / "run").exists()
+
+
 def test_ctrl_c_breaks_the_wait_for_an_answer():
     class Keyboard(StringIO):
         def readline(self, _size: int = -1) -> str:
