@@ -29,6 +29,11 @@ NOTE = frozenset({"text", "columns"})
 REMOVED = "(removed)"
 _PATH = re.compile(r"(?:[A-Za-z]:\\|\\\\|/)[^\s\"',;:*?<>|]+")
 
+_NO_PATH = re.compile(r"\w(?:/(?:s2|s|V|Hz\^0\.5|port\d+|line\d+))+[).\]]*")
+"""A unit or a digital line, from the last character before its first slash. Any other text with slashes counts as a
+path, even if it does not begin with one: relative paths contain names too.
+"""
+
 
 def write_bundle(path: Path, target: Path, *, anonymous: bool) -> tuple[str, ...]:
     """Write the archive `target` for the data file `path`; returns the names of its parts.
@@ -94,7 +99,13 @@ def _without(content: Any, names: Sequence[str]) -> Any:
 def _plain(text: str, names: Sequence[str]) -> str:
     for name in names:
         text = text.replace(name, REMOVED)
-    return _PATH.sub(lambda found: found[0] if found[0].count("/") < 2 and "\\" not in found[0] else REMOVED, text)
+    return _PATH.sub(lambda found: REMOVED if _is_path(found) else found[0], text)
+
+
+def _is_path(found: re.Match[str]) -> bool:
+    if _NO_PATH.fullmatch(found.string, max(found.start() - 1, 0), found.end()):
+        return False
+    return found[0].count("/") > 1 or "\\" in found[0]
 
 
 def _text(part: Callable[[], str]) -> str:

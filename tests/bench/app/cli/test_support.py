@@ -84,6 +84,13 @@ def test_paths_of_both_systems_are_removed() -> None:
     assert text == "cannot open (removed) nor (removed); 3 m/s2"
 
 
+def test_units_and_lines_of_devices_are_no_paths() -> None:
+    text = "the gain is 0.52 m/s2/V (0.5 m/s2/V), the noise 1e-3 m/s2/Hz^0.5; Dev1/port0/line1 is open"
+    assert anonymised(text, ()) == text
+    assert json.loads(anonymised(json.dumps({"text": text}), ())) == {"text": text}
+    assert anonymised("runs/jane/s2/V.h5, /s2/V, /port0/line1", ()) == "runs(removed), (removed), (removed)"
+
+
 def test_notes_names_and_paths_of_the_journal_are_removed() -> None:
     note = {
         "kind": "OperatorNote",
