@@ -16,9 +16,11 @@ CONTINUOUS, SYSTEM_REQUIRED = 0x80000000, 0x00000001
 ENDING = 1.0
 """Longest wait for the inhibiting program to end [s]."""
 
+INHIBITION = ("--what=sleep:idle", "--who=rockbench", "--why=a run is under way", "--mode=block")
+"""Options of systemd-inhibit, which runs the command after them."""
 COMMANDS = {
     "linux": (
-        *("systemd-inhibit", "--what=sleep:idle", "--who=rockbench", "--why=a run is under way", "--mode=block"),
+        *("systemd-inhibit", *INHIBITION),
         *(sys.executable, "-c", "import sys; sys.stdin.read()"),
     ),
     "darwin": ("caffeinate", "-i", "-w", str(os.getpid())),
@@ -28,7 +30,10 @@ COMMANDS = {
 
 @contextmanager
 def awake(system: str = sys.platform) -> Generator[bool]:
-    """Context manager that keeps the computer from going to sleep; yields whether the request was accepted."""
+    """Context manager that keeps the computer from going to sleep; yields whether that was requested.
+
+    The system may refuse it later, as systemd-logind does to sessions without that right; `rockbench doctor` tries it.
+    """
     if system == "win32":
         with _thread_required(_windows_state()) as required:
             yield required

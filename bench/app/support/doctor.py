@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 
+from bench.app.support.awake import INHIBITION
 from bench.provenance import software
 
 OLDEST = (3, 11)
@@ -149,12 +150,14 @@ def power(
 
 
 def sleep(which: Callable[[str], str | None] = shutil.which, system: str = sys.platform) -> Finding:
-    """Check whether a run can keep the computer from going to sleep."""
+    """Check whether a run can keep the computer from going to sleep; on Linux by trying it."""
     item = "sleep"
     if system == "win32":
         return Finding(item, Health.GOOD, "a run keeps the computer awake; closing the lid still suspends it")
     program = {"linux": "systemd-inhibit", "darwin": "caffeinate"}.get(system)
-    if program is not None and which(program) is not None:
+    path = None if program is None else which(program)
+    # systemd-logind may refuse it, for example to a session over ssh
+    if path is not None and (system != "linux" or _succeeds(path, *INHIBITION, "true")):
         return Finding(item, Health.GOOD, f"a run keeps the computer awake ({program})")
     remedy = "switch off sleep in the power settings of this computer"
     return Finding(item, Health.NOTICE, "a run cannot keep the computer awake", remedy)
@@ -193,6 +196,17 @@ def _windows_usb_suspend(output: str) -> Finding:
         remedy = "switch it off: Power Options, advanced settings, USB settings"
         return Finding(item, Health.BAD, "USB selective suspend is on", remedy)
     return Finding(item, Health.GOOD, "USB selective suspend is off")
+
+
+def _succeeds(*command: str) -> bool:
+    try:
+        # without a terminal, so that no password is asked for
+        done = subprocess.run(
+            command, stdin=subprocess.DEVNULL, capture_output=True, timeout=10.0, check=False, start_new_session=True
+        )
+    except (OSError, subprocess.TimeoutExpired):
+        return False
+    return done.returncode == 0
 
 
 def _answer(*command: str) -> str:

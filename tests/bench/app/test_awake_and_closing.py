@@ -81,5 +81,17 @@ def test_a_suspended_device_of_the_bench_is_named(tmp_path: Path) -> None:
 
 
 def test_sleep_can_be_inhibited_where_the_program_is() -> None:
-    assert sleep(lambda name: f"/usr/bin/{name}", "linux").health is Health.GOOD
+    assert sleep(lambda name: f"/usr/bin/{name}", "darwin").health is Health.GOOD
     assert sleep(lambda _: None, "linux").health is Health.NOTICE
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="runs a script")
+@pytest.mark.parametrize(("code", "health"), [(0, "good"), (1, "notice")])
+def test_on_linux_the_inhibition_is_tried(tmp_path: Path, code: int, health: str) -> None:
+    program = tmp_path / "systemd-inhibit"
+    # refuses like logind in a session over ssh: without an error when it is started
+    program.write_text(f"#!/bin/sh\necho 'Access denied' >&2\necho $* > {tmp_path / 'log'}\nexit {code}\n")
+    program.chmod(program.stat().st_mode | stat.S_IXUSR)
+    found = sleep(lambda _: str(program), "linux")
+    assert (found.health, bool(found.remedy)) == (health, health == "notice")
+    assert (tmp_path / "log").read_text().startswith("--what=sleep:idle ")
