@@ -12,6 +12,7 @@ from bench.analysis.free_decay.damping import DampingCourse
 from bench.analysis.free_decay.decay import Combined, Decay, combine
 from bench.analysis.free_decay.response import K1, K2, NAMES, XI1, XI2
 from bench.analysis.gain import COVERAGE
+from bench.analysis.uncertainty import plus_minus
 from protocols.common.decays.parameters import DecayPoint
 
 Array = NDArray[np.float64]
@@ -164,7 +165,7 @@ def _part(name: str, decays: Sequence[Decay], frame: Combined) -> Array:
 def nonlinear_text(result: FrameResult) -> str:
     """Warning that the damping depends on the amplitude, with the significant slopes."""
     slopes = [
-        f"xi{mode + 1} changes by {slope:.2g} +- {uncertainty:.1g} per metre of drift"
+        f"xi{mode + 1} changes by {plus_minus(slope, COVERAGE * uncertainty)} (k = 2) per metre of drift"
         for mode, (slope, uncertainty) in enumerate(zip(result.slopes.values, result.slope_uncertainty, strict=True))
         if result.nonlinear[mode]
     ]

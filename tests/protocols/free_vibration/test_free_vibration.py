@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
+from bench.analysis.free_decay.decay import Combined
 from bench.analysis.free_decay.stretch import Unusable
 from bench.analysis.uncertainty import in_brackets, plus_minus
 from bench.app.catalogue import load_protocol
@@ -29,6 +30,7 @@ from bench.guard.limits import Limits
 from bench.protocol import Prepared, Protocol
 from bench.results import FILE
 from protocols.common.calibrate import Unmeasurable
+from protocols.common.decays.frame import FrameResult, nonlinear_text
 from protocols.common.decays.pulse import SHARE, plan_pulse
 from protocols.coupling_stiffness.protocol import CouplingStiffnessParameters
 from protocols.coupling_stiffness.results import springs_sections
@@ -259,6 +261,16 @@ def test_decays_of_different_length_are_drawn_together(tmp_path: Path) -> None:
     result, _ = run(parameters, bench(), out, figures=True)
     assert result.status == "completed"
     assert (out / "free_vibration.png").exists()
+
+
+def test_a_slope_of_the_damping_is_told_with_its_expanded_uncertainty() -> None:
+    none = np.zeros((2, 2))
+    slopes = Combined(
+        np.array([0.26, 0.01]), np.diag([0.05**2, 0.05**2]), none, np.ones(2), np.ones((1, 2)), np.ones(2)
+    )
+    frame = Combined(np.ones(8), np.eye(8), np.zeros((8, 8)), np.ones(8), np.ones((1, 8)), np.ones(8))
+    result = FrameResult((), frame, slopes, (1.0, 1.0), none, np.zeros((8, 2)), np.zeros(8), {})
+    assert "xi1 changes by 0.26 +- 0.10 (k = 2) per metre of drift; the" in nonlinear_text(result)
 
 
 def test_a_run_that_fails_does_not_leave_the_table_clamped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
