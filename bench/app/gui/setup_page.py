@@ -37,6 +37,8 @@ class DevicesPanel(QWidget):
         self._controller = controller
         self._path: Path | None = None
         self._command: Command | None = None
+        self._wanted = False
+        """Whether the result of the search is for the present configuration."""
         self.ask = QPushButton(texts.FIND)
         give_key(self.ask, "Ctrl+D")
         self.message = QLabel(texts.FIND_EMPTY, wordWrap=True)
@@ -56,6 +58,9 @@ class DevicesPanel(QWidget):
 
     def use(self, configuration: BenchConfiguration, path: Path | None) -> None:
         """Use this configuration, read from `path`, for the next search, and clear the displayed result."""
+        if path != self._path:
+            # the devices of a search that is under way are those of another configuration
+            self._wanted = False
         self._path = path
         simulated = configuration.backend == "simulated"
         self._say(texts.FIND_SIMULATED if simulated else texts.FIND_EMPTY, "calm")
@@ -65,6 +70,7 @@ class DevicesPanel(QWidget):
         """Start the search, which takes a few seconds."""
         if self._command is not None or not self.ask.isEnabled():
             return
+        self._wanted = True
         self._command = Command(["devices", *(["--config", str(self._path)] if self._path else [])], self)
         self._command.over.connect(self._over)
         self._say(texts.FINDING, "wait")
@@ -74,6 +80,9 @@ class DevicesPanel(QWidget):
         if self._command is not None:
             self._command.deleteLater()
         self._command = None
+        if not self._wanted:
+            self._refresh()
+            return
         if code == 0:
             self._say(texts.FOUND, "calm")
             self.found.setPlainText(text)
@@ -141,7 +150,7 @@ class SetupPage(QWidget):
         try:
             configuration, notices = read_configuration(path), former_keys(path)
         except RockbenchError as error:
-            self._say(f"▲ {texts.CONFIGURATION_KEPT.format(text=error)}", "alarm")
+            self._say(f"▲ {texts.CONFIGURATION_KEPT.format(text=error)}\n{self._in_use()}", "alarm")
             return
         self._given, self._used, self._notices = configuration, {}, notices
         self._use(configuration, path)
@@ -158,7 +167,7 @@ class SetupPage(QWidget):
             configuration = result.applied(self.configuration)
         except RockbenchError as error:
             text = texts.CONFIGURATION_KEPT.format(text=error)
-            self._say(f"▲ {text}", "alarm")
+            self._say(f"▲ {text}\n{self._in_use()}", "alarm")
             self.refused.emit(text)
             return
         self._used[result.kind] = result.path
@@ -178,11 +187,13 @@ class SetupPage(QWidget):
         self.opened.emit(configuration)
         self.used.emit(dict(self._used))
 
-    def _show(self) -> None:
+    def _in_use(self) -> str:
         lines = [f"{texts.CONFIGURATION}: {self.path or texts.VIRTUAL}"]
         lines += [texts.IDENTIFIED.format(kind=kind.capitalize(), path=path) for kind, path in self._used.items()]
-        lines += self._notices
-        self._say("\n".join(lines), "calm")
+        return "\n".join((*lines, *self._notices))
+
+    def _show(self) -> None:
+        self._say(self._in_use(), "calm")
         if self.path is not None:
             self.recent.add(self.path)
         self.tree.use(self.configuration)

@@ -47,7 +47,8 @@ class UseResult(QWidget):
         self._refresh()
 
     def use(self, file: Path | None) -> None:
-        """Offer the results in the folder of this data file, which a thread lists."""
+        """Offer the results in the folder of this data file, which a thread lists; a refusal concerned another one."""
+        self.show_used(self._used)
         self._offer([])
         self._reader.call(list if file is None else partial(results_in, file.parent))
 

@@ -108,6 +108,7 @@ def test_another_configuration_is_opened_and_a_refused_one_keeps_the_old(
     page.open_configuration(bad)
     assert "bad.toml: limits.drift = -1 is refused" in page.source.text()
     assert "stays" in page.source.text()
+    assert f"{texts.CONFIGURATION}: {good}" in page.source.text()
     assert as_toml(page.configuration) == shown
     assert page.path == good
     window.protocol.check_plan()
@@ -160,6 +161,11 @@ def test_devices_are_asked_for_by_the_command_and_the_window_goes_on(
     qtbot.waitUntil(lambda: "search for devices failed" in panel.message.text(), timeout=LONG_MS)
     assert f"--config {tmp_path / 'refused'}" in panel.message.text()
     assert panel.ask.isEnabled()
+    # another configuration is opened during a search
+    panel.look()
+    panel.use(window.setup.configuration, None)
+    qtbot.waitUntil(panel.ask.isEnabled, timeout=LONG_MS)
+    assert (panel.message.text(), panel.found.toPlainText()) == (texts.FIND_SIMULATED, "")
 
 
 LINES = (

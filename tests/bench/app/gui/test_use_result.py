@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from bench.analysis.laser_calibration import LaserCalibration, LaserCurve
+from bench.app.display import texts
 from bench.app.gui.window import Window
 from bench.config.result_files import write_calibration, write_specimen
 from bench.control.table_model import TableModel
@@ -109,6 +110,10 @@ def test_an_unsuitable_result_is_refused_with_its_reason(window: Window, run: Pa
     reuse.use_it.click()
     assert "specimen file" in reuse.message.text()
     assert setup.configuration.identified is None
+    # what is in use is shown beside the refusal, which ends with the choice of another run
+    assert texts.VIRTUAL in setup.source.text()
+    reuse.use(None)
+    assert reuse.message.text() == ""
 
 
 def test_nothing_is_changed_during_a_run(window: Window, run: Path) -> None:
