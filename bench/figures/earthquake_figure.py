@@ -195,6 +195,8 @@ def _draw_points(panel: "Axes", rows: list[dict[str, Any]]) -> None:
 def _draw_drift(panel: "Axes", drift: DriftPicture, colour: str, width: float, name: str) -> None:
     time = drift.dt * np.arange(drift.measured.size)
     panel.plot(time, 1e3 * drift.measured, color=colour, linewidth=width, label=f"{name}, measured")
+    if not drift.predicted.size:
+        return
     predicted = drift.predicted_dt * np.arange(drift.predicted.size)
     panel.plot(
         predicted,

@@ -305,11 +305,12 @@ def histories_parts(campaign: Campaign) -> list[Part]:
     for first in range(0, len(names), MOST):
         some = [drift for drift in drifts if drift.name in names[first : first + MOST]]
         if some:
-            caption = (
-                "Drift of the bare frame and of the frame coupled by the softest spring: measured, and predicted "
-                "for the achieved table motion; without a prediction for a test that ended early."
-            )
-            parts.append(Picture(drift_figure(some), caption, "Drift against time, one row per record."))
+            caption = "Drift of the bare frame and of the frame coupled by the softest spring: measured"
+            if any(drift.predicted.size for drift in some):
+                caption += ", and predicted for the achieved table motion"
+            if not all(drift.predicted.size for drift in some):
+                caption += "; no prediction for tests that ended early or whose signals cannot be evaluated"
+            parts.append(Picture(drift_figure(some), f"{caption}.", "Drift against time, one row per record."))
     return parts
 
 
@@ -332,10 +333,9 @@ def _bare_and_softest(plays: Sequence[Played]) -> list[Played]:
 
 
 def _predicted_drift(campaign: Campaign, shaking: Shaking, play: Played, shown: Floats) -> Floats:
-    """Predicted drift [m] every `STEP` seconds under the measured table motion; empty if it cannot be evaluated, as for
-    a test that ended before its record: its table motion does not end at rest.
-    """
+    """Predicted drift [m] every `STEP` seconds under the measured table motion; empty if it cannot be evaluated."""
     if len(shown) < shaking.target.acceleration.size:
+        # the evaluation of the table's motion requires signals that end at rest
         return np.zeros(0)
     specimen = campaign.specimen.bare() if play.beta is None else campaign.specimen.coupled(play.beta)
     try:

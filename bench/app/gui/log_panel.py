@@ -11,6 +11,7 @@ from bench.app.display.typography import typeset
 from bench.app.formatting import clock
 from bench.app.gui.controller import Controller
 from bench.app.run_display import Notice
+from bench.events import State
 
 LOG_LINES = 2000
 """Largest number of stored lines; older ones are discarded."""
@@ -73,11 +74,16 @@ class LogPanel(QWidget):
         bar = self.text.verticalScrollBar()
         bar.setValue(bar.maximum())
 
+    @property
+    def _stores(self) -> bool:
+        """Whether a note would be stored: the data file is closed before the figures are drawn."""
+        return self._controller.running and self._controller.session.scene.state is not State.CLOSED
+
     def _send(self) -> None:
-        if self._controller.running and self.note.text().strip():
+        if self._stores and self.note.text().strip():
             self._controller.note(self.note.text())
             self.note.clear()
 
     def _refresh(self) -> None:
         for part in (self.note, self.add_note):
-            part.setEnabled(self._controller.running)
+            part.setEnabled(self._stores)

@@ -151,6 +151,9 @@ class RunPage(QWidget):
         self.steady.begin(run)
         self.block = BlockAngle()
         self.meters.use(run.configuration)
+        if self._controller.session.attached is not None:
+            # the gains of an earlier run; those of a window's own run were predicted before
+            self.live.predict({})
         if contents.protocol is not None:
             self.live.begin(contents.protocol, run)
             self.matrix.begin(contents.protocol, run)

@@ -125,11 +125,10 @@ function show(changed) {
 
 function receive(message) {
   heard = performance.now();
-  // what `check` wrote over is drawn again, even if nothing has changed meanwhile
-  const lost = document.body.classList.contains("lost");
-  document.body.classList.remove("lost");
-  const changed = JSON.parse(message.data);
+  const changed = JSON.parse(message.data), classes = document.body.classList, lost = classes.contains("lost");
+  classes.remove("lost");
   Object.assign(found, changed);
+  // after a loss of the link, an unchanged head must replace what check() has written
   if (!document.hidden) show(lost ? found : changed);
 }
 

@@ -46,6 +46,9 @@ class ScriptedClient:
     def answer(self, number: int, *, agreed: bool) -> None:
         self.asked.append((number, agreed))
 
+    def note(self, text: str, by: str) -> None:
+        self.asked.append((text, by))
+
     def leave(self) -> None:
         self.asked.append("leave")
 

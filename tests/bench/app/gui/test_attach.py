@@ -62,12 +62,15 @@ def test_a_window_after_a_killed_one_has_state_log_and_stop(
     session.send_signal(signal.SIGKILL)
     session.wait()
     window = opened(qtbot)
+    # points of an earlier run
+    window.run.gains.add({"omega_rad_s": 16.0, "beta": 0.4, "alpha_2": 0.21})
     began = time.monotonic()
     controller = window.header._controller  # pyright: ignore[reportPrivateUsage]
     qtbot.waitUntil(lambda: window.header.word.text() == "RUNNING", timeout=LONG_MS)
     qtbot.waitUntil(lambda: "shaking" in window.run.log.toPlainText(), timeout=LONG_MS)
     qtbot.waitUntil(lambda: len(window.run.traces.ring) > 0, timeout=LONG_MS)
     print(f"attached after {time.monotonic() - began:.2f} s")
+    assert window.run.gains.measured == []
     assert str(tmp_path / "run") in window.header.reason.text()
     assert "another window's run" in window.header.reason.text().lower()
     assert not window.protocol.start.isEnabled()

@@ -365,6 +365,21 @@ def test_the_model_beside_the_test_is_told_while_the_bench_is_driven(page: RunPa
     assert page.twin.text().endswith(": -"), "a run that is over has no live model"
 
 
+def test_a_note_that_no_file_would_store_stays_in_its_field(page: RunPage, link: ScriptedClient) -> None:
+    note = page.panel.note
+    link.said = [Published(StateChanged(State.IDLE, State.ARMED, "armed", time=1.0))]
+    page._controller._look()
+    assert note.isEnabled()
+    link.said = [Published(StateChanged(State.STOPPING, State.CLOSED, "the rig is closed", time=2.0))]
+    page._controller._look()
+    note.setText("a bolt was loose")
+    note.returnPressed.emit()
+    assert not note.isEnabled()
+    assert note.text() == "a bolt was loose"
+    assert link.asked == []
+    note.clear()
+
+
 def test_ramping_out_is_a_request_of_its_own(page: RunPage, link: ScriptedClient, qtbot: QtBot) -> None:
     link.said = [Beat(State.RUNNING, "", 1.0, 0, 0)]
     page._controller._look()

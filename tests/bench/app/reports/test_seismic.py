@@ -20,7 +20,7 @@ from bench.datafile.recorder import Recorder
 from bench.datafile.tables import Column
 from bench.document.campaign import Campaign
 from bench.document.document import Listing, Picture, Table
-from bench.engine.steps import Arm, OperatorAction, Plan, Play, RampOut
+from bench.engine.steps import Arm, OperatorAction, Plan, Play, Publish, RampOut
 from bench.events import PointFinished, Warned
 from bench.figures.earthquake_figure import DriftPicture, drift_figure
 from bench.live_values import RunningGain
@@ -28,14 +28,8 @@ from bench.testing.loopback import LoopbackRig
 from drivers.rig import Channel, Counts, OperatorTask
 from protocols.earthquake.measurement import GainMonitor
 from protocols.earthquake.protocol import EarthquakeParameters, EarthquakePoint, PointStatus
-from protocols.earthquake.report import (
-    Played,
-    _predicted_drift,
-    _shakings,
-    played_records,
-    seismic_sections,
-    signals_of,
-)
+from protocols.earthquake.records import shakings
+from protocols.earthquake.report import histories_parts, played_records, seismic_sections, signals_of
 from sim.specimen import Specimen
 from sim.virtual_bench import VirtualBenchParameters
 from tests.recorded import recorded
@@ -209,6 +203,50 @@ def test_the_zero_of_the_drift_is_that_of_the_storeys_at_rest(tmp_path: Path) ->
         assert abs(float(np.mean(drift - expected))) < 3e-4
 
 
+@pytest.mark.parametrize("share", [1.0, 0.5])
+def test_a_test_that_ended_early_has_no_predicted_drift(tmp_path: Path, share: float) -> None:
+    """The motion of the table is evaluated from signals that end at rest."""
+    rate = 1000.0
+    bench = BenchConfiguration(
+        acquisition=Acquisition(lead=0.1), simulation=Simulation(bench=VirtualBenchParameters(sample_rate=rate))
+    )
+    parameters = EarthquakeParameters(records=("synthetic:pacoima",), table_band="1.5:25", decay=0.5)
+    (shaking,) = shakings(parameters, bench)
+    motion = shaking.target.acceleration
+
+    def plan() -> Plan:
+        for beta, played in ((None, 1.0), (0.25, share)):
+            yield Arm(parameters.rest)
+            drive = motion[: round(played * motion.size)].copy()
+            drive *= np.minimum(1.0, 0.01 * np.minimum(np.arange(drive.size), np.arange(drive.size)[::-1]))
+            yield Play(
+                shaking.volts(drive, parameters.decay) if played == 1.0 else drive, GainMonitor(NAME, beta, rate)
+            )
+            yield RampOut()
+        yield Publish(PointFinished(point(0.25, 0.8 if share == 1.0 else None)))
+
+    rig, random = LoopbackRig(), np.random.default_rng(3)
+    for name, factor in (("laser_1", 0.001), ("laser_2", 0.02)):
+        # a constant reading under a drive would be a fault
+        rig.response[name] = lambda volts, factor=factor: np.where(
+            volts == 0.0, 0.0, factor * volts + 1e-3 * random.standard_normal(volts.size)
+        )
+    metadata = {
+        "protocol": "earthquake",
+        "parameters": parameters.model_dump_json(),
+        "specimen": bench.specimen.model_dump_json(),
+    }
+    ending = recorded(tmp_path / "run.h5", plan(), rig, bench, EarthquakePoint, metadata)
+    assert ending.status == "completed", ending.reason
+    with open_datafile(tmp_path / "run.h5") as record:
+        _, drifts = (
+            part for part in histories_parts(Campaign(tmp_path / "run.h5", record)) if isinstance(part, Picture)
+        )
+    labels = [str(line.get_label()) for line in drifts.figure.axes[0].get_lines()]
+    assert sum("predicted" in label for label in labels) == (2 if share == 1.0 else 1)
+    assert ("no prediction for tests that ended early" in drifts.caption) == (share < 1.0)
+
+
 def test_a_damaged_file_is_reported_and_says_so_first(
     file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -250,22 +288,3 @@ def test_measured_and_predicted_drifts_have_their_own_intervals() -> None:
     figure = drift_figure([DriftPicture("one", None, 20.0 / 2048.0, measured, predicted, 0.01)])
     ends = [float(line.get_xdata()[-1]) for line in figure.axes[0].get_lines() if len(line.get_xdata()) > 2]
     assert sorted(ends) == pytest.approx([1.99, 299 * 20.0 / 2048.0])
-
-
-def test_a_test_that_ended_early_has_no_predicted_drift(file: Path) -> None:
-    """Its table motion does not end at rest, as the evaluation of the base motion requires."""
-    parameters = EarthquakeParameters(records=("synthetic:pacoima",), table_band="1.5:25")
-    with open_datafile(file) as record:
-        campaign = Campaign(file, record)
-        (shaking,) = _shakings(campaign, parameters)
-        play, n = Played(NAME, None, 0, 0, shaking.target.acceleration.size), shaking.target.acceleration.size
-        t = np.arange(n) / 2000.0
-        bell = np.exp(-(((t - 0.5 * t[-1]) / 1.0) ** 2))
-        table = 0.01 * bell * np.sin(12.0 * t)
-        shown = np.column_stack(
-            (np.gradient(np.gradient(table, t), t), table, 0.006 * bell, 0.015 * bell, table, table + 0.015 * bell)
-        )
-        noise = np.array([1e-3, 1e-7, 1e-6, 1e-6, 1e-6, 1e-6])
-        shown += noise * np.random.default_rng(1).standard_normal(shown.shape)
-        assert _predicted_drift(campaign, shaking, play, shown).size > 100
-        assert _predicted_drift(campaign, shaking, play, shown[: round(0.6 * n)]).size == 0

@@ -7,6 +7,7 @@ from collections.abc import Callable, Generator
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, replace
 from http.client import HTTPConnection, HTTPException, HTTPResponse
+from importlib.resources import files
 from pathlib import Path
 from threading import Event, Thread
 from typing import Any
@@ -293,3 +294,49 @@ def test_a_reader_after_a_pause_receives_the_present_document() -> None:
     # without a change as well, as for a bench at rest
     assert feed.has_readers
     assert json.loads(feed.since(0, LONG)[1]) == {"head": "now"}
+
+
+BROWSER = """
+let clock = 0;
+const elements = {}, classes = new Set();
+const performance = { now: () => clock };
+const document = {
+  hidden: false,
+  body: { classList: {
+    add: (name) => classes.add(name),
+    remove: (name) => classes.delete(name),
+    contains: (name) => classes.has(name),
+    toggle: (name, on) => on ? classes.add(name) : classes.delete(name),
+  } },
+  getElementById: (id) => elements[id] || (elements[id] = { firstElementChild: { style: {} } }),
+  addEventListener: () => {},
+};
+function EventSource() {}
+function setInterval() {}
+function addEventListener() {}
+function drawLamp() {}
+"""
+"""As much of a browser as the head of the page needs."""
+
+LINK = """
+const head = { word: "NO RUN", level: "", reason: "idle", inputs: ["", ""], run: [], fraction: 0, live: true };
+const seen = () => [elements.word.textContent, document.title, classes.has("lost")];
+receive({ data: JSON.stringify({ head }) });
+clock += 5000;
+check();
+const lost = seen();
+receive({ data: "{}" });
+JSON.stringify([lost, seen()]);
+"""
+
+
+@pytest.mark.usefixtures("qapp")
+def test_an_idle_page_whose_link_is_back_shows_its_state_again() -> None:
+    """After an interruption nothing may have changed, so that the first message is empty."""
+    engine = pytest.importorskip("PySide6.QtQml").QJSEngine()
+    script = (files("bench.app.watch") / "page" / "page.js").read_text(encoding="utf-8")
+    found = engine.evaluate(BROWSER + script + LINK)
+    assert not found.isError(), found.toString()
+    lost, back = json.loads(found.toString())
+    assert lost == ["NO LINK", "NO LINK · rocking-bench", True]
+    assert back == ["NO RUN", "NO RUN · rocking-bench", False]
