@@ -57,6 +57,14 @@ def _setup(qtbot: QtBot, folder: Path) -> SetupPage:
     return page
 
 
+def _monday(folder: Path, text: str) -> Path:
+    """The file of a preset Monday that was written by hand."""
+    file = folder / "presets" / "harmonic" / "Monday.toml"
+    file.parent.mkdir(parents=True)
+    file.write_text(text, encoding="utf-8")
+    return file
+
+
 def _line(form: Form, name: str) -> QLineEdit:
     field = form.fields[name]
     assert isinstance(field, QLineEdit)
@@ -124,9 +132,7 @@ def test_a_preset_is_saved_loaded_and_deleted(qtbot: QtBot, tmp_path: Path) -> N
 
 
 def test_a_preset_that_was_not_loaded_is_replaced_after_a_second_press_only(qtbot: QtBot, tmp_path: Path) -> None:
-    file = tmp_path / "presets" / "harmonic" / "Monday.toml"
-    file.parent.mkdir(parents=True)
-    file.write_text("# by hand\nomega = [12.5]\n", encoding="utf-8")
+    file = _monday(tmp_path, "# by hand\nomega = [12.5]\n")
     page = _page(qtbot, tmp_path)
     page.choice.setCurrentText("harmonic")
     page.presets.name.setEditText("monday")
@@ -141,9 +147,7 @@ def test_a_preset_that_was_not_loaded_is_replaced_after_a_second_press_only(qtbo
 
 
 def test_a_name_in_another_case_deletes_the_preset_that_it_shows(qtbot: QtBot, tmp_path: Path) -> None:
-    file = tmp_path / "presets" / "harmonic" / "Monday.toml"
-    file.parent.mkdir(parents=True)
-    file.write_text("omega = [12.5]\n", encoding="utf-8")
+    file = _monday(tmp_path, "omega = [12.5]\n")
     page = _page(qtbot, tmp_path)
     page.choice.setCurrentText("harmonic")
     page.presets.name.setEditText("monday")
@@ -153,9 +157,7 @@ def test_a_name_in_another_case_deletes_the_preset_that_it_shows(qtbot: QtBot, t
 
 
 def test_a_preset_that_cannot_be_read_is_not_replaced_at_the_first_press(qtbot: QtBot, tmp_path: Path) -> None:
-    file = tmp_path / "presets" / "harmonic" / "Monday.toml"
-    file.parent.mkdir(parents=True)
-    file.write_text("omega = [12.5", encoding="utf-8")
+    file = _monday(tmp_path, "omega = [12.5")
     page = _page(qtbot, tmp_path)
     page.choice.setCurrentText("harmonic")
     page.presets.name.setCurrentIndex(0)
