@@ -198,6 +198,9 @@ class ProtocolPage(QWidget):
             self._edited_test = None
             if self._show_former is not None:
                 self._show_former()
+            if self._folder and not self._began and self.folder.text() == self._folder:
+                # the folder of a run that ended during the editing is now in use
+                self.folder.clear()
             self.add.setText(texts.ADD)
             self.leave.hide()
             self.refresh()

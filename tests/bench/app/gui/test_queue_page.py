@@ -319,6 +319,20 @@ def test_options_of_an_edited_test_do_not_apply_to_the_next_run(filled: Window) 
     assert options.folder.text() == "mine"
 
 
+def test_the_folder_of_a_run_that_ended_during_editing_is_not_offered_again(
+    filled: Window, spoken: type[ScriptedClient], tmp_path: Path
+) -> None:
+    page = filled.protocol
+    page.folder.setText(str(tmp_path / "mine"))
+    page.check_plan()
+    _hear(filled, spoken, FINE)
+    page.begin()
+    page.edit(filled.runner.queue.tests[1], 2)
+    _hear(filled, spoken, Ended("completed", "", {}, "", tmp_path / "mine"))
+    page.leave_editing()
+    assert page.folder.text() == ""
+
+
 def test_a_test_that_begins_while_it_is_edited_is_not_changed(
     filled: Window, spoken: type[ScriptedClient], qtbot: QtBot
 ) -> None:
