@@ -111,15 +111,15 @@ class SpecimenKnowledge(SpecimenUncertainty):
             if weakened[i, j] != 0.0
         }
 
-    def deviations(self, specimen: Specimen) -> list[tuple[Specimen, Specimen]]:
-        """Pairs of specimens, one standard uncertainty to either side of `specimen` along independent directions.
+    def deviations(self, specimen: Specimen, share: float = 1.0) -> list[tuple[Specimen, Specimen]]:
+        """Pairs of specimens, `share` standard uncertainties to either side of `specimen` along independent directions.
 
-        For a result y, the sum over the pairs of ((y_1 - y_2) / 2)^2 is the variance to first order (GUM 5.1.4, note 2,
-        along the principal axes of the correlation matrix).
+        For a result y, the sum over the pairs of ((y_1 - y_2) / (2 share))^2 is the variance to first order (GUM 5.1.4,
+        note 2, along the principal axes of the correlation matrix).
         """
         sizes = self.relative(specimen)
         names = list(sizes)
-        steps = np.array(list(sizes.values()))[:, None] * root_of(self._matrix(specimen, names))
+        steps = share * np.array(list(sizes.values()))[:, None] * root_of(self._matrix(specimen, names))
 
         def moved(step: Floats) -> Specimen:
             return scaled(specimen, dict(zip(names, (1.0 + step).tolist(), strict=True)))

@@ -41,10 +41,8 @@ one.
 PENCIL = 3
 """Ratio of the number of cycles to the row length of the matrix pencil."""
 
-NEAR, FAR = 2, 6
-"""Smallest and largest distance from the frequency of the pair, in units of 1 / n per cycle, at which the spectrum of
-the residual is compared with its mean. At smaller distances, the fit reduces the residual.
-"""
+RATIOS = np.geomspace(1e-6, 1e4, 101)
+"""Ratios of the variances of excitation and scatter that are compared."""
 
 EARLY = 6
 """Ratio of the number of cycles to that of the first ones, without which the fit is repeated: most pairs that are not
@@ -67,9 +65,7 @@ class Multiplier:
     modulus and angle without the first cycles, beyond those expected from noise.
 
     `cycles` is the number of cycles used, `pairs` the number of fitted pairs, `autocorrelation` that of the residual
-    from one cycle to the next, and `coloured` the power of the residual near the angle of the pair, relative to its
-    mean. Where it exceeds 1, the covariance is multiplied by it. `residual` is the rms residual of a coefficient, in
-    the unit of the series.
+    from one cycle to the next, and `residual` the rms residual of a coefficient, in the unit of the series.
     """
 
     modulus: float
@@ -82,7 +78,6 @@ class Multiplier:
     cycles: int
     pairs: int
     autocorrelation: float
-    coloured: float
     residual: float
 
 
@@ -153,13 +148,15 @@ def _dominant(series: Array) -> Multiplier | None:
 class _Fit:
     """A fit: its multipliers, the dominant one first, the residual, shape (n, m), the derivatives of the weighted
     residual, shape (n, m, 2 pairs), with respect to the logarithm of the modulus and the angle of each pair, the
-    weights, shape (m,), the information `criterion`, and the `significance` of the first pair.
+    weights, shape (m,), the `pattern` of the weighted coefficients in the motion of the first pair, shape (m,), the
+    information `criterion`, and the `significance` of the first pair.
     """
 
     multipliers: Complex
     residual: Array
     slopes: Array
     weights: Array
+    pattern: Complex
     criterion: float
     significance: float
 
@@ -186,7 +183,9 @@ def _fitted(series: Array, pairs: int) -> _Fit | None:
     # two equal multipliers cannot be separated
     if np.linalg.matrix_rank(slopes) < 2 * pairs:
         return None
-    parts = _parts(series, unknowns) * weights
+    powers = _powers(n, unknowns)
+    patterns = _patterns(series, powers) * weights
+    parts: Array = np.real(patterns[:, None, :] * powers.T[:, :, None])
     sizes = np.linalg.norm(parts, axis=(1, 2))
     multipliers = np.exp(unknowns[::2] + 1j * unknowns[1::2])
     # a pair with a much smaller contribution fits noise, however slowly it decays
@@ -197,22 +196,23 @@ def _fitted(series: Array, pairs: int) -> _Fit | None:
     # the noise in the contribution of a pair has two degrees of freedom per coefficient
     significance = float(np.linalg.norm(parts[order[0]])) / (2.0 * m) ** 0.5
     slopes = slopes.reshape(n, m, pairs, 2)[:, :, order, :].reshape(n, m, 2 * pairs)
-    return _Fit(multipliers[order], residual, slopes, weights, criterion, significance)
+    return _Fit(multipliers[order], residual, slopes, weights, patterns[order[0]], criterion, significance)
 
 
 def _stated(fit: _Fit, size: float) -> Multiplier:
-    """The dominant pair of `fit`, with its covariance for a residual that is correlated between coefficients."""
+    """The dominant pair of `fit`, with its covariance for a residual that is correlated between coefficients and due in
+    part to random excitation of the motion, which the multiplier carries on from cycle to cycle.
+    """
     whitened = fit.residual * fit.weights
     n, m = whitened.shape
     free = n - 1 - 2 * fit.multipliers.size
     between = whitened.T @ whitened / free
-    information = np.tensordot(fit.slopes, fit.slopes, ((0, 1), (0, 1)))
+    inverse = np.linalg.inv(np.tensordot(fit.slopes, fit.slopes, ((0, 1), (0, 1))))
     correlated = np.tensordot(fit.slopes, np.matmul(between, fit.slopes), ((0, 1), (0, 1)))
-    inverse = np.linalg.inv(information)
-    covariance = inverse @ correlated @ inverse
     dominant = complex(fit.multipliers[0])
-    coloured = _coloured(whitened, float(np.angle(dominant)))
-    covariance *= max(coloured, 1.0)
+    excitation = _excited(_along(whitened, fit.pattern), dominant)
+    carried = _carried(np.tensordot(fit.pattern, fit.slopes, (0, 1)), dominant)
+    covariance = inverse @ (correlated + 0.5 * excitation * (carried.T @ carried.conj()).real) @ inverse
     spread = np.sqrt(np.diag(covariance)[:2])
     follows = float(np.sum(whitened[1:] * whitened[:-1]) / np.sum(whitened**2))
     angle = abs(float(np.angle(dominant)))
@@ -227,46 +227,74 @@ def _stated(fit: _Fit, size: float) -> Multiplier:
         cycles=n,
         pairs=fit.multipliers.size,
         autocorrelation=follows,
-        coloured=coloured,
         residual=size * float(np.sqrt(np.sum(fit.residual**2) / (free * m))),
     )
 
 
-def _coloured(whitened: Array, angle: float) -> float:
-    """Power of the `whitened` residual, shape (n, m), near `angle` [rad] per cycle, relative to its mean over all
-    angles: noise at other angles has little effect on the fitted pair.
+def _along(whitened: Array, pattern: Complex) -> Complex:
+    """Complex coordinate of each cycle of the `whitened` residual, shape (n, m), along the `pattern` of a pair, shape
+    (m,): the residual is nearest to Re(pattern coordinate).
     """
-    n = whitened.shape[0]
-    away = np.arange(NEAR, FAR + 1, dtype=np.float64)
-    angles: Array = angle + tau / n * np.concatenate((-away, away))
-    spectrum = np.exp(-1j * np.outer(angles, np.arange(n, dtype=np.float64))) @ whitened
-    return float(np.mean(np.abs(spectrum) ** 2) / np.mean(whitened**2) / n)
+    axes = np.stack((pattern.real, -pattern.imag), axis=1)
+    found = np.linalg.lstsq(axes, whitened.T, rcond=None)[0]
+    return found[0] + 1j * found[1]
 
 
-def _columns(n: int, values: Array) -> Array:
-    """Basis of the series, shape (n, 1 + 2 pairs): a constant, and the real and imaginary parts of each mu^n, scaled to
-    a largest modulus of 1.
+def _excited(along: Complex, multiplier: complex) -> float:
+    """Variance of the excitation w of a coordinate z_n = s_n + e_n, s_(n+1) = mu s_n + w_n, with scatter e.
+
+    That of maximum likelihood among `RATIOS` to the variance of e, from the spectrum of z_(n+1) - mu z_n (Whittle, J.
+    R. Stat. Soc. B 15, 1953), in which excitation is white.
     """
+    changes = along[1:] - multiplier * along[:-1]
+    n = changes.size
+    power = np.abs(np.fft.fft(changes)) ** 2 / n
+    if not power.any():
+        return 0.0
+    # the scatter of the first and the last cycle occurs in one change only, which counts as an excitation of 2 / n of its
+    # variance; less could not be distinguished from none in n cycles
+    of_scatter = np.abs(1.0 - multiplier * np.exp(-1j * tau * np.arange(n) / n)) ** 2
+    spectra: Array = of_scatter + RATIOS[:, None]
+    scatter = np.mean(power / spectra, axis=1)
+    likeliest = int(np.argmin(np.mean(np.log(spectra), axis=1) + np.log(scatter)))
+    return float(RATIOS[likeliest] * scatter[likeliest])
+
+
+def _carried(effects: Complex, multiplier: complex) -> Complex:
+    """Effect of a change of the coordinate in each cycle on the unknowns, shape (n, k), for those of the coordinate in
+    each cycle, `effects` of the same shape: the multiplier carries a change on to all later cycles.
+    """
+    from scipy.signal import lfilter
+
+    return np.asarray(lfilter([1.0], [1.0, -multiplier], effects[::-1], axis=0), dtype=np.complex128)[::-1]
+
+
+def _powers(n: int, values: Array) -> Complex:
+    """mu^n of each pair in each cycle, shape (n, pairs), scaled to a largest modulus of 1."""
     rates: Complex = values[::2] + 1j * values[1::2]
     # a growing pair is scaled to 1 in the last cycle, so that no power overflows
     times: Array = np.arange(n, dtype=np.float64)[:, None] - np.where(np.real(rates) > 0.0, n - 1.0, 0.0)
-    powers: Complex = np.exp(rates * times)
-    pairs = np.stack((np.real(powers), np.imag(powers)), axis=2).reshape(n, -1)
-    return np.concatenate((np.ones((n, 1)), pairs), axis=1)
+    return np.exp(rates * times)
+
+
+def _columns(powers: Complex) -> Array:
+    """Basis of the series, shape (n, 1 + 2 pairs): a constant, and the real and imaginary parts of the `powers`."""
+    n = powers.shape[0]
+    return np.concatenate(
+        (np.ones((n, 1)), np.stack((np.real(powers), np.imag(powers)), axis=2).reshape(n, -1)), axis=1
+    )
 
 
 def _left(series: Array, values: Array) -> Array:
     """Residual of the linear problem for given multipliers, shape (n, m)."""
-    across = np.linalg.qr(_columns(series.shape[0], values)).Q
+    across = np.linalg.qr(_columns(_powers(series.shape[0], values))).Q
     return series - across @ (across.T @ series)
 
 
-def _parts(series: Array, values: Array) -> Array:
-    """Contribution of each pair to the series, shape (pairs, n, m)."""
-    basis = _columns(series.shape[0], values)
-    found = np.linalg.lstsq(basis, series, rcond=None)[0]
-    pairs = range(1, basis.shape[1], 2)
-    return np.stack([basis[:, k : k + 2] @ found[k : k + 2] for k in pairs])
+def _patterns(series: Array, powers: Complex) -> Complex:
+    """Coefficients of each pair, shape (pairs, m): its contribution to the series is Re(pattern power)."""
+    found = np.linalg.lstsq(_columns(powers), series, rcond=None)[0]
+    return found[1::2] - 1j * found[2::2]
 
 
 def _pencil(series: Array, pairs: int) -> Complex | None:

@@ -21,6 +21,11 @@ Array = NDArray[np.float64]
 STEP = 0.002
 """Relative change of the amplitude in the finite difference for the sensitivity."""
 
+NEAR = 0.1
+"""Deviation of specimens for the spread of the sensitivity, in standard uncertainties. It is small, so that no other
+pair of multipliers becomes the dominant one.
+"""
+
 CLOSE = 0.02
 """Difference between the moduli of two pairs of multipliers up to which either may dominate in the actual specimen."""
 
@@ -79,11 +84,11 @@ def on_table(orbit: Orbit, shaker: Shaker | None, harmonics: int) -> complex | N
 
 def predicted(orbit: Orbit, known: SpecimenKnowledge, shaker: Shaker | None, harmonics: int) -> Predicted:
     """Multiplier of `orbit`; its uncertainty is propagated to first order (GUM 5.1.4, note 2)."""
-    moved = known.deviations(orbit.specimen)
-    sides = [(_slowest(more, orbit), _slowest(less, orbit)) for more, less in moved]
-    slopes = np.array([_slopes(more, orbit) - _slopes(less, orbit) for more, less in moved]).reshape(-1, 2)
+    sides = [(_slowest(more, orbit), _slowest(less, orbit)) for more, less in known.deviations(orbit.specimen)]
+    near = known.deviations(orbit.specimen, NEAR)
+    slopes = np.array([_slopes(more, orbit) - _slopes(less, orbit) for more, less in near]).reshape(-1, 2)
     slope, turn = _slopes(orbit.specimen, orbit)
-    slope_spread, turn_spread = np.linalg.norm(0.5 * slopes, axis=0)
+    slope_spread, turn_spread = np.linalg.norm(slopes / (2.0 * NEAR), axis=0)
     return Predicted(
         fixed=orbit.slowest,
         table=on_table(orbit, shaker, harmonics),

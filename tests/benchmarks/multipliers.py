@@ -4,10 +4,10 @@
         [--boundary 15.2:15.6:0.97]
 
 Each run is `rockbench run stability` on the simulated bench, whose storeys and spring are off by up to `--share`
-(rectangular), its damping by 30 % and its restitution by 1 %; the scale of its accelerometer is off with a standard
-deviation of 0.5 %, as configured. The truth is computed with `sim.table_orbit` for the drawn specimen at the stated
-amplitude, so that the error of the scale counts. The measured pair is compared with the nearest one; where another
-pair is slower, this is counted. Printed for each run: errors of modulus and angle, absolute and in expanded
+(rectangular), its damping by 30 % and its restitution by 1 %, as configured; the scale of its accelerometer is off with
+a standard deviation of 0.5 %, as assumed. The truth is computed with `sim.table_orbit` for the drawn specimen at the
+stated amplitude, so that the error of the scale counts. The measured pair is compared with the nearest one; where
+another pair is slower, this is counted. Printed for each run: errors of modulus and angle, absolute and in expanded
 uncertainties. In the end: rms error, and the shares covered. With `--boundary`, each run brackets the boundary between
 two frequencies; its truth is found by bisection.
 """
@@ -48,6 +48,7 @@ def measured(
         config = configured(specimen, factor, seed, Path(folder))
         with config.open("a", encoding="utf-8") as file:
             file.write(f"[simulation.bench.accelerometer]\nscale_error = {error!r}\n")
+            file.write(f"[uncertainty]\nstiffness = {share!r}\nspring = {share!r}\n")
         command = ["run", "stability", "--yes", "--json", "--config", str(config), "--out", f"{folder}/run"]
         with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()) as told:
             status = main([*command, "--beta", str(beta), *options])

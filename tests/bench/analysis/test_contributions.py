@@ -38,7 +38,7 @@ def test_the_contributions_of_decays_and_of_the_block_have_an_origin() -> None:
 
 
 def test_the_contributions_of_records_and_of_released_motions_have_an_origin() -> None:
-    found = Multiplier(1.02, 1e-3, 2.8, 1e-3, 0.0, 1e-3, 1e-3, 60, 1, 0.0, 1.0, 1e-6)
+    found = Multiplier(1.02, 1e-3, 2.8, 1e-3, 0.0, 1e-3, 1e-3, 60, 1, 0.0, 1e-6)
     released = parts_of(found, (0.1, 0.01), 0.005)
     assert {CHOICE, *released} <= SOURCES.keys()
 

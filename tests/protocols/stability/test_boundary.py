@@ -33,7 +33,7 @@ from protocols.stability.results import (
 )
 from sim.cycle_map import cycle_map
 from sim.errors import InvalidInput
-from sim.knowledge import SpecimenKnowledge
+from sim.knowledge import SpecimenKnowledge, SpecimenUncertainty
 from sim.specimen import Specimen
 from sim.steady import Orbit, rocking_orbit
 from tests.protocols.harmonic.scripted import cycle
@@ -144,11 +144,24 @@ def test_the_sensitivity_to_the_amplitude_and_the_uncertainty_of_a_prediction() 
     assert 0.0 < uncertain.uncertainty < 0.1
     slopes = [
         [predicted(rocking_orbit(each, 15.0, AMPLITUDE, guess=orbit()), exact, None, 1) for each in pair]
-        for pair in damping.deviations(orbit().specimen)
+        for pair in damping.deviations(orbit().specimen, 0.1)
     ]
     for name in ("slope", "turn"):
-        parts = [0.5 * (getattr(more, name) - getattr(less, name)) for more, less in slopes]
+        parts = [5.0 * (getattr(more, name) - getattr(less, name)) for more, less in slopes]
         assert getattr(uncertain, f"{name}_spread") == pytest.approx(hypot(*parts), rel=1e-4)
+
+
+def test_the_spread_of_the_sensitivity_is_that_of_one_pair() -> None:
+    """At 15.6 rad/s, two pairs of multipliers have nearly the same modulus, and exchange dominance within the
+    uncertainty of the specimen: the spread is a hundred times that of a hundredth of this uncertainty.
+    """
+    near = rocking(Specimen().coupled(0.97), 15.6, AMPLITUDE)
+    assert near is not None
+    known = SpecimenKnowledge()
+    little = known.model_copy(update={name: 0.01 * getattr(known, name) for name in SpecimenUncertainty.model_fields})
+    wide, narrow = (predicted(near, each, None, 1) for each in (known, little))
+    assert wide.slope_spread == pytest.approx(100.0 * narrow.slope_spread, rel=0.02)
+    assert wide.turn_spread == pytest.approx(100.0 * narrow.turn_spread, rel=0.02)
 
 
 @pytest.mark.parametrize(("omega", "beta"), [(15.0, 0.97), (16.0, 0.4)])
