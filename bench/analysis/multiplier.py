@@ -251,8 +251,8 @@ def _excited(along: Complex, multiplier: complex) -> float:
     power = np.abs(np.fft.fft(changes)) ** 2 / n
     if not power.any():
         return 0.0
-    # the scatter of the first and the last cycle occurs in one change only, which counts as an excitation of 2 / n of its
-    # variance; less could not be distinguished from none in n cycles
+    # the scatter of the first and the last cycle occurs in one change only, which counts as an excitation of 2 / n of
+    # its variance; less could not be distinguished from none in n cycles
     of_scatter = np.abs(1.0 - multiplier * np.exp(-1j * tau * np.arange(n) / n)) ** 2
     spectra: Array = of_scatter + RATIOS[:, None]
     scatter = np.mean(power / spectra, axis=1)

@@ -20,7 +20,8 @@ class CommonMotion:
     """The second signal is `polarity * scale` times the first, `delay` [s] later.
 
     `uncertainty` is the standard uncertainty of the delay [s], from the scatter of the phases about the fitted line;
-    `scatter` is that scatter [rad], which is large if the two sensors did not measure the same motion.
+    `scatter` is that scatter [rad], which is large if the two sensors did not measure the same motion. `delay` is the
+    weighted mean of the delays at the frequencies, and `spread` [s] their weighted rms deviation from it.
     """
 
     delay: float
@@ -28,6 +29,7 @@ class CommonMotion:
     polarity: int
     scale: float
     scatter: float
+    spread: float
 
 
 def common_motion(
@@ -50,6 +52,8 @@ def common_motion(
     fits = [(_through_origin(omega, sign * ratio, weight), sign) for sign in (1, -1)]
     (delay, variance), polarity = min(fits, key=lambda fit: fit[0][1])
     moment = float(weight @ omega**2)
+    # the weights of the delays are weight * omega^2 / moment, and a delay is a phase over omega
+    spread = np.sqrt(variance * (omega.size - 1) / omega.size / moment)
     return CommonMotion(
         delay=delay,
         # the weights are only relative, so the variance is estimated from the scatter
@@ -57,6 +61,7 @@ def common_motion(
         polarity=polarity,
         scale=float(abs(np.sum(weight * ratio * np.exp(1j * omega * delay)))),
         scatter=float(np.sqrt(variance)),
+        spread=float(spread),
     )
 
 

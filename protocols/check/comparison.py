@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from math import inf, isinf
+from math import inf, isinf, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -90,12 +90,26 @@ _SKEW = (
 )
 
 
+def held_for(configuration: BenchConfiguration) -> float:
+    """Time [s] for which the readings of a laser are held. Those of serial lasers are placed at the times of their
+    measurement.
+    """
+    serial = configuration.backend == "hardware" and configuration.hardware.lasers.connection == "serial"
+    return 0.0 if serial else configuration.analysis.laser_timing
+
+
 def table_delay_lines(
-    sines: Sines, parameters: CheckParameters, sample_rate: float, *, lasers: bool, most: float = inf
+    sines: Sines,
+    parameters: CheckParameters,
+    sample_rate: float,
+    *,
+    lasers: bool,
+    most: float = inf,
+    timing: float = 0.0,
 ) -> Iterator[CheckLine]:
     """Lines for the delay of the accelerometer against the table's displacement sensor and, with `lasers` on the
     ground, of each laser against the accelerometer; the latter has limits if `most` [s], its largest magnitude, is
-    finite. Together with `delay_lines`, every pair of these channels is compared.
+    finite. `timing` is that of `laser_delay`. Together with `delay_lines`, every pair of these channels is compared.
 
     The limits include half a sample: the lag of an acceleration that follows each step of the zero-order-hold output.
     """
@@ -103,7 +117,7 @@ def table_delay_lines(
         return
     pair = delay_between(sines.omega, sines.displacement, sines.accelerometer)
     storeys = dict(zip(STOREYS, (sines.storey_1, sines.storey_2), strict=True)) if lasers else {}
-    against = {name: delay_between(sines.omega, sines.accelerometer, seen) for name, seen in storeys.items()}
+    against = {name: laser_delay(sines.omega, sines.accelerometer, seen, timing) for name, seen in storeys.items()}
     middle = float(np.mean([one.delay for one in against.values()])) if against else np.nan
     # the lasers lag behind the correct sensor only by their latency, so the sensor nearer to them is assumed correct
     alone = TABLE_ACCELERATION if abs(middle + pair.delay) < abs(middle) else TABLE_DISPLACEMENT
@@ -140,6 +154,19 @@ def delay_between(omega: NDArray[np.float64], first: Amplitudes, second: Amplitu
     # the amplitudes are for exp(-i omega t), those of `common_motion` for exp(+i omega t)
     found = common_motion(omega, first.conj(), second.conj())
     return replace(found, uncertainty=student_factor(omega.size) * found.uncertainty)
+
+
+def laser_delay(omega: NDArray[np.float64], table: Amplitudes, laser: Amplitudes, timing: float) -> CommonMotion:
+    """Delay of a laser against the table, whose readings are held until the next one: their age is uniform between 0
+    and `timing` [s], 0 for readings that are placed at the times of their measurement.
+
+    The mean delay over all ages is stated. If the laser's clock runs almost like the sample clock, the ages at all
+    frequencies are similar, without scatter; if it drifts, they are spread over the interval. The variance of their
+    mean is therefore that of an age minus their spread (law of total variance), but at least that of the scatter.
+    """
+    found = delay_between(omega, table, laser)
+    of_age = max(timing**2 / 12.0 - found.spread**2, 0.0)
+    return replace(found, uncertainty=max(found.uncertainty, sqrt(of_age)))
 
 
 def scale_lines(sines: Sines, parameters: CheckParameters, *, lasers: bool) -> Iterator[CheckLine]:
@@ -189,7 +216,8 @@ def delay_lines(sines: Sines, parameters: CheckParameters, configuration: BenchC
     most = allowed_delay(configuration.known_specimen, parameters.highest_omega, parameters.u1_error)
     hardware = configuration.hardware.lasers
     settable = configuration.backend == "hardware" and hardware.connection == "serial"
-    found = [delay_between(omega, sines.displacement, seen) for seen in (sines.storey_1, sines.storey_2)]
+    timing = held_for(configuration)
+    found = [laser_delay(omega, sines.displacement, seen, timing) for seen in (sines.storey_1, sines.storey_2)]
     difference, between = found[1].delay - found[0].delay, COVERAGE * configuration.analysis.laser_timing
     differs = _table_differs(sines, parameters, configuration.sample_rate)
     for name, motion in zip(STOREYS, found, strict=True):

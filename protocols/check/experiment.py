@@ -40,7 +40,7 @@ from bench.figures.style import BLUE, GREY, VERMILLION, new_figure, set_grid, wr
 from bench.figures.text_table import TextColumn, text_table
 from bench.protocol import Plan, Prepared, Result, Sources
 from drivers.rig import OperatorTask
-from protocols.check.comparison import Sines, allowed_delay, delay_lines, scale_lines, table_delay_lines
+from protocols.check.comparison import Sines, allowed_delay, delay_lines, held_for, scale_lines, table_delay_lines
 from protocols.check.lines import alignment_lines, drive_lines, expected_drive, input_lines, resting_lines, safety_lines
 from protocols.check.protocol import MARKS, CheckParameters, allowed_range, number
 from protocols.common.calibrate import (
@@ -177,7 +177,8 @@ def _motion(parameters: CheckParameters, configuration: BenchConfiguration) -> G
     yield from _publish(scale_lines(sines, parameters, lasers=on_ground))
     most = allowed_delay(configuration.known_specimen, parameters.highest_omega, parameters.u1_error)
     rate = configuration.sample_rate
-    yield from _publish(table_delay_lines(sines, parameters, rate, lasers=on_ground, most=most))
+    timing = held_for(configuration)
+    yield from _publish(table_delay_lines(sines, parameters, rate, lasers=on_ground, most=most, timing=timing))
     if on_ground:
         yield from _publish(delay_lines(sines, parameters, configuration))
     else:

@@ -1,8 +1,8 @@
 """Delays that `rockbench check` measures, on drawn sensors: for `audit`.
 
-The sines of a check follow each other, the frame locked to the table, on one clock of each laser that drifts against
-the samples. Against the table's displacement, the accelerometer has no delay, and a laser has that of its latency and,
-on average, of half a measurement until it is replaced.
+The sines of a check follow each other, the frame locked to the table, on one clock of each laser whose rate is off by
+up to `coverage_sensors.CLOCK` (rectangular). Against the table's displacement, the accelerometer has no delay, and a
+laser has that of its latency and, on average, of half a measurement until it is replaced.
 """
 
 from math import tau
@@ -10,10 +10,10 @@ from math import tau
 import numpy as np
 
 from bench.analysis.signals import ACCELERATION, DISPLACEMENT, LASER_1, LASER_2
-from protocols.check.comparison import delay_between
+from protocols.check.comparison import delay_between, laser_delay
 from protocols.check.protocol import CheckParameters
 from protocols.common.calibrate import SETTLING
-from tests.benchmarks.coverage_sensors import LEAD, RATE, REST, Motion, Sensors, cycles_of
+from tests.benchmarks.coverage_sensors import ACCURACY, LEAD, RATE, REST, Motion, Sensors, cycles_of
 from tests.benchmarks.estimates import Estimate
 
 ASKED = CheckParameters()
@@ -46,8 +46,10 @@ def delays(seed: int) -> dict[str, Estimate]:
         measured = cycles[SETTLING : SETTLING + ASKED.cycles]
         amplitudes.append(np.mean([each.fundamental for each in measured], axis=0))
     columns = np.array(amplitudes).T
-    table, first, second = (
-        delay_between(OMEGAS, columns[DISPLACEMENT], columns[column]) for column in (ACCELERATION, LASER_1, LASER_2)
+    table = delay_between(OMEGAS, columns[DISPLACEMENT], columns[ACCELERATION])
+    first, second = (
+        laser_delay(OMEGAS, columns[DISPLACEMENT], columns[column], ACCURACY.laser_timing)
+        for column in (LASER_1, LASER_2)
     )
     laser = sensors.lasers[0]
     mean = (laser.latency + 0.5) / (laser.rate * (1.0 + laser.clock_error))

@@ -61,6 +61,12 @@ CASES = {
     )
 }
 
+CLOCK = 50e-6
+"""Largest relative difference between the rates of a laser's clock and the sample clock, as of two quartz clocks."""
+
+REFERENCE_WAVES = (0.5, 2.0)
+"""Fewest and most periods of the linearity error of the table's displacement sensor over the calibrated span."""
+
 SOURCES = ("linearity", "scales", "table", "harmonics", "transient", "truth", "steps")
 """Sources of error that `--off` switches off one by one."""
 
@@ -101,6 +107,13 @@ class Sensors:
             )
             for scale, wave, noise in zip(scales, waves, noises, strict=True)
         ]
+        others = np.random.default_rng([seed, 5])
+        clocks = others.uniform(-CLOCK, CLOCK, 2)
+        self.lasers = [
+            laser.model_copy(update={"clock_error": float(clock)})
+            for laser, clock in zip(self.lasers, clocks, strict=True)
+        ]
+        self.reference = float(others.uniform(*REFERENCE_WAVES)), float(others.uniform(0.0, tau))
         self.seeds = SeedSequence([seed, 2]).spawn(2)
         self.rest = self.random.uniform(-0.002, 0.002, 2)
         self.table = 1.0 + on["table"] * ACCURACY.table_scale * float(self.random.standard_normal())
@@ -114,9 +127,10 @@ class Sensors:
         x, v, a, u1, u2, v1, v2 = (
             np.concatenate((np.zeros(REST), getattr(motion, name))) for name in Motion.__dataclass_fields__
         )
+        x_shown = self.table * x + (self._reference_error(x) if self.case.calibrated else 0.0)
         volts = np.array(
             [
-                p.displacement_sensor.volts(self.table * x, RATE, self.random),
+                p.displacement_sensor.volts(x_shown, RATE, self.random),
                 p.accelerometer.volts(self.table * a, RATE, self.random),
                 # the same seed: the same laser, its clock anywhere
                 self._laser(0, x + u1, v + v1),
@@ -126,10 +140,19 @@ class Sensors:
         counts = p.converter.counts(p.filter_unit.stream(RATE).read(volts).T, self.random)
         return np.column_stack([channel.to_unit(counts[:, k]) for k, channel in enumerate(self.channels)])
 
+    def _reference_error(self, x: Array) -> Array:
+        """Linearity error of the table's displacement sensor [m], with the assumed limit."""
+        asked = LaserCalibrationParameters()
+        span = 2.0 * max(amplitude for _, amplitude in planned_passes(asked))
+        waves, phase = self.reference
+        return asked.reference_linearity * span * np.sin(tau * waves * x / span + phase)
+
     def _laser(self, number: int, seen: Array, speed: Array) -> Array:
         stream = self.lasers[number].stream(RATE, self.seeds[number])
         before = int(self.random.integers(0, 2000))
-        here = np.concatenate((np.zeros(before), seen)) + self.rest[number]
+        # the storeys come to rest within one step of the laser's output
+        rest = self.rest[number] + ACCURACY.laser_resolution * float(self.random.uniform(-0.5, 0.5))
+        here = np.concatenate((np.zeros(before), seen)) + rest
         return stream.read(here, np.concatenate((np.zeros(before), speed)))[before:]
 
     def signals(self, motion: Motion, found: LaserCalibration | None) -> Array:

@@ -17,6 +17,8 @@ from protocols.check.comparison import (
     allowed_delay,
     delay_between,
     delay_lines,
+    held_for,
+    laser_delay,
     scale_lines,
     signed_scale,
     table_delay_lines,
@@ -93,6 +95,32 @@ def test_the_intervals_of_delays_and_scales_cover_95_percent() -> None:
     assert 0.93 < np.mean(inside) < 0.985
     scales = [signed_scale(OMEGA, second, first) for first, second in pairs]
     assert 0.93 < np.mean([abs(scale - 1.0) <= COVERAGE * u for scale, u in scales]) < 0.99
+
+
+@pytest.mark.parametrize("drift", [0.0, 0.02, 0.1, 0.2, 0.37])
+def test_the_interval_of_a_lasers_delay_covers_the_mean_age_of_its_readings(drift: float) -> None:
+    """The age of the held readings is uniform at first, and changes by `drift` of a period from one frequency to the
+    next. With clocks of equal rates it never scatters, and an interval from scatter alone would cover nothing; where
+    the ages are spread over a period, it would suffice.
+    """
+    period, latency, random = 2.5e-4, 1e-3, np.random.default_rng(9)
+    x, inside, alone = sines().displacement, 0, 0
+    for first in random.uniform(0.0, 1.0, 200):
+        ages = (first + drift * np.arange(OMEGA.size)) % 1.0
+        noise = 1.0 + 1e-5 * random.standard_normal(OMEGA.size)
+        laser = late(x, latency + period * ages) * noise
+        found = laser_delay(OMEGA, x, laser, period)
+        off = abs(found.delay - latency - 0.5 * period)
+        inside += off <= COVERAGE * found.uncertainty
+        alone += off <= COVERAGE * delay_between(OMEGA, x, laser).uncertainty
+    assert inside >= 190
+    assert alone < 20 or drift > 0.01
+
+
+def test_readings_of_serial_lasers_have_no_age() -> None:
+    assert held_for(BenchConfiguration()) == BenchConfiguration().analysis.laser_timing
+    assert held_for(SERIAL) == 0.0
+    assert held_for(ANALOGUE) == ANALOGUE.analysis.laser_timing
 
 
 def test_without_lasers_only_the_table_is_compared() -> None:
