@@ -259,8 +259,10 @@ class StabilityPlan:
             return StabilityPoint.model_validate({**values, "status": OrbitStatus.NOT_MEASURABLE, "reason": reason})
         scale = self._configuration.sensors.table_scale
         predicted = trial.predicted
-        parts = parts_of(found, (predicted.slope, predicted.slope_spread), scale)
-        turned = known_norm((predicted.turn, predicted.turn_spread)) * scale
+        own = hypot(found.modulus_uncertainty, found.modulus_other, known_norm((predicted.slope,)) * scale)
+        local = predicted.given(found.modulus, own)
+        parts = parts_of(found, (local.slope, local.slope_spread), scale)
+        turned = known_norm((local.turn, local.turn_spread)) * scale
         expanded, expected = COVERAGE * combined(parts), COVERAGE * predicted.uncertainty
         apart = abs(found.modulus - abs(predicted.multiplier))
         return StabilityPoint.model_validate(

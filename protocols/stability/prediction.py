@@ -2,8 +2,9 @@
 
 from cmath import phase
 from collections.abc import Sequence
-from dataclasses import dataclass
-from math import degrees, hypot, nan
+from dataclasses import dataclass, replace
+from math import degrees, hypot, nan, sqrt
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,7 +36,8 @@ class Predicted:
     """Dominant multiplier of an orbit: on `fixed` ground and, if the shaker is known, on the `table`. On fixed ground,
     `uncertainty` is the standard uncertainty of the modulus due to the specimen, and `slope` and `turn` [rad] are the
     derivatives of modulus and angle with respect to the logarithm of the amplitude. `slope_spread` and `turn_spread`
-    are the standard uncertainties of these derivatives due to the specimen.
+    are the standard uncertainties of these derivatives due to the specimen, and `slope_tie` and `turn_tie` [rad] their
+    covariances with the modulus of the same pair, whose variance is `variance`, to first order.
     """
 
     fixed: complex
@@ -45,6 +47,26 @@ class Predicted:
     turn: float
     slope_spread: float
     turn_spread: float
+    slope_tie: float = 0.0
+    turn_tie: float = 0.0
+    variance: float = 0.0
+
+    def given(self, modulus: float, uncertainty: float) -> Self:
+        """The prediction with the slopes that are expected after `modulus` was measured with the standard
+        `uncertainty`, and with their remaining spread: the specimens for which the prediction is off by this much are
+        those with other slopes (normal distribution, to first order).
+        """
+        total = self.variance + uncertainty**2
+        if not total > 0.0:
+            return self
+        off = (modulus - abs(self.multiplier)) / total
+        return replace(
+            self,
+            slope=self.slope + self.slope_tie * off,
+            turn=self.turn + self.turn_tie * off,
+            slope_spread=sqrt(max(self.slope_spread**2 - self.slope_tie**2 / total, 0.0)),
+            turn_spread=sqrt(max(self.turn_spread**2 - self.turn_tie**2 / total, 0.0)),
+        )
 
     @property
     def multiplier(self) -> complex:
@@ -86,30 +108,34 @@ def predicted(orbit: Orbit, known: SpecimenKnowledge, shaker: Shaker | None, har
     """Multiplier of `orbit`; its uncertainty is propagated to first order (GUM 5.1.4, note 2)."""
     sides = [(_slowest(more, orbit), _slowest(less, orbit)) for more, less in known.deviations(orbit.specimen)]
     near = known.deviations(orbit.specimen, NEAR)
-    slopes = np.array([_slopes(more, orbit) - _slopes(less, orbit) for more, less in near]).reshape(-1, 2)
-    slope, turn = _slopes(orbit.specimen, orbit)
-    slope_spread, turn_spread = np.linalg.norm(slopes / (2.0 * NEAR), axis=0)
+    changes = np.array([_local(more, orbit) - _local(less, orbit) for more, less in near]).reshape(-1, 3)
+    of_modulus, of_slope, of_turn = (changes / (2.0 * NEAR)).T
+    _, slope, turn = _local(orbit.specimen, orbit)
     return Predicted(
         fixed=orbit.slowest,
         table=on_table(orbit, shaker, harmonics),
         uncertainty=hypot(*(0.5 * (abs(one) - abs(other)) for one, other in sides)),
         slope=float(slope),
         turn=float(turn),
-        slope_spread=float(slope_spread),
-        turn_spread=float(turn_spread),
+        slope_spread=float(np.linalg.norm(of_slope)),
+        turn_spread=float(np.linalg.norm(of_turn)),
+        slope_tie=float(of_modulus @ of_slope),
+        turn_tie=float(of_modulus @ of_turn),
+        variance=float(of_modulus @ of_modulus),
     )
 
 
-def _slopes(specimen: Specimen, orbit: Orbit) -> Array:
-    """Derivatives of modulus and angle [rad] of the dominant multiplier of `specimen` with respect to the logarithm of
-    the amplitude, shape (2,). They are NaN if no orbit is found.
+def _local(specimen: Specimen, orbit: Orbit) -> Array:
+    """Modulus of the dominant multiplier of `specimen`, and the derivatives of its modulus and angle [rad] with respect
+    to the logarithm of the amplitude, shape (3,). They are NaN if no orbit is found.
     """
     more, less = (_moved(specimen, orbit, 1.0 + step) for step in (STEP, -STEP))
     if more is None or less is None:
-        return np.full(2, nan)
+        return np.full(3, nan)
     # the same pair at both amplitudes, even if two pairs exchange dominance between them
     same = min((complex(each) for each in less.multipliers), key=lambda each: abs(each - more.slowest))
-    return np.array([abs(more.slowest) - abs(same), phase(more.slowest) - phase(same)]) / (2.0 * STEP)
+    moduli, turned = np.array([abs(more.slowest), abs(same)]), phase(more.slowest) - phase(same)
+    return np.array([moduli.mean(), (moduli[0] - moduli[1]) / (2.0 * STEP), turned / (2.0 * STEP)])
 
 
 def _slowest(specimen: Specimen, orbit: Orbit) -> complex:

@@ -151,6 +151,30 @@ def test_the_sensitivity_to_the_amplitude_and_the_uncertainty_of_a_prediction() 
         assert getattr(uncertain, f"{name}_spread") == pytest.approx(hypot(*parts), rel=1e-4)
 
 
+def test_a_measured_modulus_determines_the_slope_as_far_as_they_are_tied() -> None:
+    """If only the spring is uncertain, a modulus determines the specimen, and thus its slopes. A modulus that is
+    known no better than the specimen leaves half of the correction, and one that is unknown leaves all.
+    """
+    nominal = Specimen().coupled(0.97)
+    near = rocking(nominal, 15.4, AMPLITUDE)
+    assert near is not None
+    exact = SpecimenKnowledge(stiffness=0.0, damping=0.0, restitution=0.0, spring=0.0)
+    spring = exact.model_copy(update={"spring": 0.04})
+    ((stiffer, _),) = spring.deviations(nominal, 0.2)
+    other = rocking_orbit(stiffer, 15.4, AMPLITUDE, guess=near)
+    expected, found = predicted(other, exact, None, 1), predicted(near, spring, None, 1)
+    assert abs(expected.slope - found.slope) > 0.01
+    known = found.given(other.multiplier, 1e-6)
+    assert known.slope == pytest.approx(expected.slope, abs=0.1 * abs(expected.slope - found.slope))
+    assert known.turn == pytest.approx(expected.turn, abs=0.1 * abs(expected.turn - found.turn))
+    assert known.slope_spread < 0.01 * found.slope_spread
+    half = found.given(other.multiplier, found.variance**0.5)
+    assert half.slope - found.slope == pytest.approx(0.5 * (known.slope - found.slope), rel=1e-3)
+    assert half.slope_spread == pytest.approx(0.5**0.5 * found.slope_spread, rel=1e-6)
+    assert found.given(other.multiplier, 1e6).slope == pytest.approx(found.slope, rel=1e-6)
+    assert expected.given(1.0, 0.0) is expected
+
+
 def test_the_spread_of_the_sensitivity_is_that_of_one_pair() -> None:
     """At 15.6 rad/s, two pairs of multipliers have nearly the same modulus, and exchange dominance within the
     uncertainty of the specimen: the spread is a hundred times that of a hundredth of this uncertainty.
