@@ -18,8 +18,8 @@ TAKEN = (
 
 
 class FurtherChannel(CalibratedInput):
-    """An additional analogue sensor, which is recorded, displayed and exported like every other channel, and monitored
-    if it has a limit.
+    """An additional analogue sensor, which is recorded, displayed, exported, and monitored for lost and stuck samples
+    like every other channel; its magnitude is limited if it has a limit.
 
     On hardware it is a DAQ input; on the simulated bench it measures the motion of `place`.
     """
@@ -38,7 +38,7 @@ class FurtherChannel(CalibratedInput):
         None,
         "unit",
         "largest permitted magnitude relative to the value at rest; beyond it the guard aborts; if absent, the "
-        "channel is not monitored",
+        "magnitude is not limited",
         gt=0,
         example=20.0,
     )

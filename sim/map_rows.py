@@ -7,6 +7,7 @@ since the next block continues from the last rows of the previous one.
 
 from collections.abc import Generator
 from dataclasses import dataclass
+from math import ceil
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,12 +15,15 @@ from numpy.typing import NDArray
 from sim.return_map import MOST_KNOWN, Solution, Solutions, extrapolated, follow, newton, parameters
 from sim.specimen import Specimen
 from sim.steady import NoOrbit, branch_solutions
-from sim.sweep import Done, connection, processors, sweep
+from sim.sweep import Done, connection, sweep
 
 Floats = NDArray[np.float64]
 
-STRIPS = 2
-"""Number of strips of columns per processor: enough to balance the load, but few enough to keep each strip wide."""
+STRIPS, WIDE = 4, 125
+"""Smallest number of strips of columns, and largest number of columns of a strip if there are more strips: enough of
+them to balance the load, but wide ones. The number of processors has no influence on the strips, because an orbit may
+be found from its neighbour in the same strip only.
+"""
 
 POINTS = 40_000
 """Approximate number of points of a block, which requires about 50 MB."""
@@ -64,7 +68,7 @@ def rows_of_orbits(
     `sim.sweep.sweep`; `done` counts the strips of each block.
     """
     with connection(scheduler):
-        parts = np.array_split(np.arange(omegas.size), min(omegas.size, STRIPS * processors(scheduler)))
+        parts = np.array_split(np.arange(omegas.size), min(omegas.size, max(STRIPS, ceil(omegas.size / WIDE))))
         if after is None:
             first = _first_row(specimens[0], omegas, amplitude)
             after, size = Continuation(0, first.section[None], first.jacobian[None]), 1

@@ -179,11 +179,13 @@ class Waves:
 def mean_waves(cycles: Sequence[Cycle], bound: Mapping[int, int] | None = None) -> Waves:
     """Mean of the cycles' coefficients. Unlike a mean of peaks, it is not biased by noise.
 
+    Harmonics that were not fitted in all cycles, because some have few samples, are omitted.
+
     `bound` maps a column to the highest harmonic of its signal; the mean and the higher harmonics of that signal are
     set to zero.
     """
-    all_coefficients = np.array([cycle.coefficients for cycle in cycles])
-    harmonics = (all_coefficients.shape[1] - 1) // 2
+    harmonics = min((cycle.coefficients.shape[0] - 1) // 2 for cycle in cycles)
+    all_coefficients = np.array([_up_to(harmonics, cycle.coefficients) for cycle in cycles])
     orders: NDArray[np.float64] = np.arange(1, harmonics + 1, dtype=np.float64)
     for column, highest in (bound or {}).items():
         all_coefficients[:, np.concatenate(([0.0], orders, orders)) > highest, column] = 0.0
@@ -206,6 +208,14 @@ def mean_waves(cycles: Sequence[Cycle], bound: Mapping[int, int] | None = None) 
         there=there,
         harmonics=np.sqrt(power[1:].sum(axis=0) / fundamental),
     )
+
+
+def _up_to(harmonics: int, coefficients: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Coefficients of a cycle up to a harmonic."""
+    fitted = (coefficients.shape[0] - 1) // 2
+    if fitted == harmonics:
+        return coefficients
+    return np.concatenate((coefficients[: 1 + harmonics], coefficients[1 + fitted : 1 + fitted + harmonics]))
 
 
 def _peak(waveform: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -9,7 +9,8 @@ Every test of the bare frame is a check: the frame is linear and driven by a sin
 laser have no harmonics except the small ones caused by those of the table. The harmonics of a reading x(phase) are
 those of its error e(x(phase)): for a pure sine they are the Chebyshev coefficients of the curve over the swing. The
 posterior of the curve given the harmonics is that of Gaussian process regression (Rasmussen and Williams, 2006, section
-2.2), averaged over the numbers of waves with their evidence as weights (section 5.2). The amplitude is not estimated,
+2.2), for each number of waves. Of those that their evidence (section 5.2) does not exclude, the one with the largest
+effect is assumed: a bare frame that moves much less than the coupled one excludes few. The amplitude is not estimated,
 since a small swing does not determine amplitude and number of waves separately. The posterior mean is not subtracted
 from the result: it is part of the uncertainty, as an uncorrected effect (GUM F.2.4.5).
 """
@@ -47,6 +48,9 @@ CAUTION = 0.3
 and because the harmonics of a small swing hardly determine the number of waves.
 """
 
+PLAUSIBLE = 0.5
+"""Smallest weight of a number of waves, relative to the largest one, at which the checks do not exclude it."""
+
 LEAST = 1e-5
 """Smallest uncertainty of a harmonic, relative to the limit of the data sheet, so that exact harmonics can be
 evaluated.
@@ -80,11 +84,11 @@ class Harmonics:
         rounding. Returns the same object for the same step.
 
         The scatter of the cycles does not contain this uncertainty, since all cycles are rounded alike. As derived for
-        `bench.analysis.gain.PEAK_ROUNDINGS`, the variance of one harmonic is 2 zeta(3) q^3 / (pi^4 A), half of it in
-        each part.
+        `bench.analysis.gain.PEAK_ROUNDINGS`, the mean square of the amplitude of one harmonic is zeta(3) q^3 /
+        (pi^4 A), half of it in each part.
         """
         swing = max(0.5 * self.swing, step, np.finfo(np.float64).tiny)
-        rounding = min(sqrt(ZETA_3 * step**3 / (pi**4 * swing)), step / sqrt(12.0))
+        rounding = min(sqrt(0.5 * ZETA_3 * step**3 / (pi**4 * swing)), step / sqrt(12.0))
         return self.with_uncertainty(rounding)
 
     def with_uncertainty(self, uncertainty: float) -> "Harmonics":
@@ -196,7 +200,9 @@ def linearity_errors(
     mean = np.einsum("kmi,km->ki", white, learned.measured)
     moments = prior - white.transpose(0, 2, 1) @ white + mean[:, :, None] * mean[:, None, :]
     found = exp(float(learned.likely @ np.log(waves)))
-    return LinearityErrors(np.einsum("k,kij->ij", learned.likely, moments), found)
+    plausible = learned.likely >= PLAUSIBLE * learned.likely.max()
+    sizes = np.where(plausible, np.einsum("i,kij,j->k", shares, moments, shares), -1.0)
+    return LinearityErrors(moments[int(sizes.argmax())], found)
 
 
 @dataclass(frozen=True, eq=False)

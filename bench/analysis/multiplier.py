@@ -99,7 +99,7 @@ def dominant_multiplier(series: Array) -> Multiplier | None:
     m): coefficients of successive cycles at a constant drive.
 
     None if there are too few cycles for a second estimate without the first ones, from at least `SHORTEST` cycles, or
-    if no pair is significant. Raises ValueError for values that are not finite.
+    if no pair is significant in both. Raises ValueError for values that are not finite.
     """
     if not np.isfinite(series).all():
         raise ValueError("the series of coefficients has values that are not finite")
@@ -109,7 +109,7 @@ def dominant_multiplier(series: Array) -> Multiplier | None:
     found = _dominant(series)
     later = None if found is None else _dominant(late)
     if found is None or later is None:
-        return found
+        return None
     return replace(
         found,
         modulus_other=_beyond_noise(

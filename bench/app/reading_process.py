@@ -86,7 +86,7 @@ class ReadingProcess:
 def _started() -> subprocess.Popen[bytes]:
     # unbuffered: at exit, Python aborts if a thread still holds the lock of a buffer in which it waits
     return subprocess.Popen(
-        [sys.executable, "-m", "bench.app.reading_process"],
+        [sys.executable, "-P", "-m", "bench.app.reading_process"],
         bufsize=0,
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,

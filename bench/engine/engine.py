@@ -165,5 +165,5 @@ def configured_engine(
     """Return the engine of a configured bench, with a guard that has the configured limits and signal map."""
     signals = SignalMap(rig.channels, configuration.laser_reference, configuration.calibrated)
     limits, ramps, shaker = configuration.limits, configuration.ramps, configuration.shaker_model
-    guard = Guard(rig, limits, ramps, shaker, signals, configuration.channels)
+    guard = Guard(rig, limits, ramps, shaker, signals, configuration.channels, configuration.laser_ranges)
     return Engine(rig, guard, stream, requests, operator, configuration.block_samples)

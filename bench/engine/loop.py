@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from bench.analysis.cycles import Cycle, CycleAnalyser
 from bench.analysis.fall import FallWatch
-from bench.analysis.signals import SIGNALS, scatter
+from bench.analysis.signals import MEASURED_BY, SIGNALS, scatter
 from bench.control.oscillator import sweeps
 from bench.engine.interface import Ended, Ending, EventStream, Requests
 from bench.engine.output import Output
@@ -281,10 +281,13 @@ class SineDrive:
         return Scheduled(max(-wait, 0) / self._rate)
 
     def _invalid(self, counts: Counts) -> Counter[tuple[int, int]]:
-        """Number of samples of each invalid count in a block, by column and count."""
+        """Number of samples of each invalid count in a block, by column and count, of the channels whose missing
+        samples are missing in the cycles.
+        """
         return Counter(
             (column, count)
             for column, channel in enumerate(self._channels)
+            if channel.name in MEASURED_BY
             for count in counts[:, column].tolist()
             if not channel.valid[0] <= count <= channel.valid[1]
         )

@@ -53,7 +53,7 @@ class Guard:
 
     A `shaker` model estimates force and current from the motion where no channel measures them. With `signals`, each
     block is converted to signals once, and the guard also checks the drift and those `further` channels that have a
-    limit.
+    limit. `laser_ranges` are those of `WatchedQuantities`.
     """
 
     def __init__(
@@ -64,6 +64,7 @@ class Guard:
         shaker: ShakerModel | None = None,
         signals: SignalMap | None = None,
         further: Sequence[FurtherChannel] = (),
+        laser_ranges: Sequence[float] | None = None,
     ) -> None:
         self._rig = rig
         self._limits = limits
@@ -82,6 +83,7 @@ class Guard:
         """`_owed`: number of samples that may be queued in the rig in addition to those in `_waiting`. `_zeros`: number
         of samples read since the ramp ended and `_waiting` contained only zeros.
         """
+        self._laser_ranges = laser_ranges
         self._make_watches()
         self._warmed = 0.0, 0.0
         """Exponential mean of the squared coil current [A2] at the end of the last armed period, and its time [s]."""
@@ -260,7 +262,7 @@ class Guard:
 
     def _make_watches(self) -> None:
         rate = self._rig.sample_rate
-        self._motion = MotionWatch(self._channels, rate, self._limits, self._shaker, self._further)
+        self._motion = MotionWatch(self._channels, rate, self._limits, self._shaker, self._further, self._laser_ranges)
         self._sensors = SensorWatch(self._channels, rate, self._limits)
         self._time = TimeWatch(rate, self._limits)
 

@@ -61,8 +61,8 @@ class ChannelLimit:
 class MotionWatch:
     """Check of blocks of values against the limits. Channels are found by name; absent ones are not checked.
 
-    `further` are the limits on the signals of further channels. Raises InvalidInput for a limit that its channel cannot
-    measure.
+    `further` are the limits on the signals of further channels, `laser_ranges` those of `WatchedQuantities`. Raises
+    InvalidInput for a limit that its channel cannot measure.
     """
 
     def __init__(
@@ -72,9 +72,10 @@ class MotionWatch:
         limits: Limits,
         shaker: ShakerModel | None = None,
         further: Sequence[ChannelLimit] = (),
+        laser_ranges: Sequence[float] | None = None,
     ) -> None:
         _check_reach(channels, limits, further)
-        self._quantities = WatchedQuantities(channels, sample_rate, limits.heating_time, shaker)
+        self._quantities = WatchedQuantities(channels, sample_rate, limits.heating_time, shaker, laser_ranges)
         self._limits = {key: float(getattr(limits, key)) for key in WATCHED}
         self._warn_at = {key: limit * float(getattr(limits.warning, key)) for key, limit in self._limits.items()}
         debounce = {key: round(float(getattr(limits.debounce, key)) * sample_rate) for key in WATCHED}

@@ -1,6 +1,6 @@
 """Magnitudes of the limited quantities of table motion, shaker load and lasers, block by block."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import sqrt
 
 import numpy as np
@@ -33,10 +33,18 @@ class WatchedQuantities:
 
     A block is either converted by `of` or skipped: `bounds` returns upper bounds of its magnitudes, and `skip` stores
     the state required by later blocks.
+
+    `laser_ranges` are the measuring ranges of the two lasers [m], whose values are relative to mid range. Without them,
+    the range of a laser is that of its valid counts, which may have a reserve beyond the measuring range.
     """
 
     def __init__(
-        self, channels: tuple[Channel, ...], sample_rate: float, heating_time: float, shaker: ShakerModel | None
+        self,
+        channels: tuple[Channel, ...],
+        sample_rate: float,
+        heating_time: float,
+        shaker: ShakerModel | None,
+        laser_ranges: Sequence[float] | None = None,
     ) -> None:
         self._names = [channel.name for channel in channels]
         self._columns = {channel.name: column for column, channel in enumerate(channels)}
@@ -49,7 +57,12 @@ class WatchedQuantities:
         self._heat = exponential_mean(np.zeros(1), self._forget)[1]
         self._skipped: list[Array] = []
         self._skipped_samples, self._skipped_current = 0, 0.0
-        self._places = [(k, *_middle(channels[k])) for name, k in self._columns.items() if name in STOREYS]
+        ranges = {} if laser_ranges is None else dict(zip(STOREYS, laser_ranges, strict=True))
+        self._places = [
+            (k, *((0.0, 0.5 * ranges[name]) if name in ranges else _middle(channels[k])))
+            for name, k in self._columns.items()
+            if name in STOREYS
+        ]
 
     @property
     def heat(self) -> float:

@@ -13,7 +13,7 @@ from collections import deque
 from contextlib import suppress
 from typing import IO
 
-from drivers.child import ChildProcess, ignore_requests
+from drivers.child import ENDING, ChildProcess, ignore_requests
 from drivers.clock import now
 from drivers.daqmx.parameters import Daq
 from drivers.timebase.marking import GOLDEN
@@ -52,8 +52,9 @@ class ClockWatch:
     def close(self) -> None:
         """End the process; may be called repeatedly."""
         self._child.end()
-        waiting.join(self._thread)
-        self._child.output.close()
+        # the thread waits for a process that the system does not end
+        if waiting.join(self._thread, ENDING):
+            self._child.output.close()
 
     def _collect(self) -> None:
         while len(read := self._child.output.read(_READING.size)) == _READING.size:

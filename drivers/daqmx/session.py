@@ -150,7 +150,8 @@ class DaqSession:
                 # a cut from another thread before the reset of `_cut` above has changed the number
                 if cuts not in (None, self._cuts):
                     self._cut = True
-                self._tasks.prepare(lambda: self._cut)
+                with self._interrupted():
+                    self._tasks.prepare(lambda: self._cut)
 
     def write(self, volts: NDArray[np.float64]) -> None:
         """Append drive samples, shape (n,), finite and in range [V]; those written before `start` are played first.
@@ -169,13 +170,14 @@ class DaqSession:
         """Start the sample clock at sample 0. Raises DriveUnderflow if no samples were written."""
         with self._lock:
             self._require(_State.PREPARED, "start")
-            with self._resting_on_failure():
+            with self._resting_on_failure(), self._interrupted():
                 self._reset_watchdog()
                 self._beat()
                 self._tasks.output.arm()
                 if self._tasks.marker is not None:
                     self._tasks.marker.arm()
                 self._tasks.inputs.start()
+                self._require(_State.PREPARED, "start")
                 self._state = _State.RUNNING
 
     def read(self, n: int) -> NDArray[np.int16 | np.int32]:
@@ -301,6 +303,17 @@ class DaqSession:
                 except BaseException as second:
                     error.add_note(str(second))
                     raise second from error
+            raise
+
+    @contextmanager
+    def _interrupted(self) -> Generator[None]:
+        """Context manager for steps during which a signal handler of this thread may stop the session: the steps that
+        follow in its body may end the rest, so that an error makes the session rest again.
+        """
+        try:
+            yield
+        except BaseException:
+            self._at_rest = False
             raise
 
     def _rest(self) -> None:

@@ -7,6 +7,7 @@ from threading import Condition, Thread
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.child import ENDING
 from drivers.clock import now
 from drivers.errors import ConnectionLost
 from drivers.optoncdt.codec import Decoder
@@ -105,8 +106,9 @@ class Stream:
         """Stop reading and end the thread and the process; may be called repeatedly."""
         self._over = True
         self._line.close()
-        waiting.join(self._thread)
-        self._line.release()
+        # the thread waits for a process that the system does not end, such as one in a driver that hangs
+        if waiting.join(self._thread, ENDING):
+            self._line.release()
 
     def _send(self, command: str) -> None:
         try:

@@ -16,7 +16,7 @@ from sim.excitation import SampledRecord
 from sim.extras import MissingExtra
 from sim.gain import seismic_curve
 from sim.knowledge import SpecimenKnowledge
-from sim.map_rows import STRIPS
+from sim.map_rows import STRIPS, WIDE
 from sim.maps import gain_map
 from sim.outcomes import outcome_map
 from sim.specimen import Specimen
@@ -92,7 +92,8 @@ def test_a_scheduler_s_workers_do_the_work(cluster: Any) -> None:
         sweep(inverse, [1, 0], address)
 
 
-def test_a_map_is_divided_for_the_cluster_s_processors(cluster: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_map_is_divided_alike_on_all_computers(cluster: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """So that its orbits do not depend on them; there are strips for both workers, and more of a wide map."""
     strips: list[int] = []
 
     def counted(function: Any, items: Any, scheduler: str | None, *, done: Any) -> list[Any]:
@@ -100,12 +101,27 @@ def test_a_map_is_divided_for_the_cluster_s_processors(cluster: Any, monkeypatch
         return sweep(function, items, scheduler, done=done)
 
     monkeypatch.setattr("sim.map_rows.sweep", counted)
-    # this machine's own number is another one
-    monkeypatch.setattr("os.cpu_count", lambda: 64)
     address, omegas = str(cluster.scheduler_address), np.linspace(14.0, 20.0, 12)
-    gain_map(Specimen(), [0.2, 0.6], omegas, A_S, scheduler=address)
     assert processors(address) == 2
-    assert strips == [STRIPS * 2]
+    found = [gain_map(Specimen(), [0.2, 0.6], omegas, A_S, scheduler=address)]
+    for number in (1, 64):
+        monkeypatch.setattr("os.cpu_count", lambda number=number: number)
+        found.append(gain_map(Specimen(), [0.2, 0.6], omegas, A_S))
+    assert strips == [STRIPS] * 3
+    for other in found[1:]:
+        np.testing.assert_array_equal(other.rocking.alpha_2, found[0].rocking.alpha_2)
+    gain_map(Specimen(), [0.2], np.linspace(14.0, 20.0, 6 * WIDE), A_S)
+    assert strips[-1] == 6
+
+
+def test_orbits_that_need_a_neighbour_do_not_depend_on_the_processors(monkeypatch: pytest.MonkeyPatch) -> None:
+    """At steps of this size, the column at 28 rad/s is continued from its neighbour."""
+    found = list[Any]()
+    for number in (1, 2, 4):
+        monkeypatch.setattr("os.cpu_count", lambda number=number: number)
+        found.append(gain_map(Specimen(), np.linspace(0.02, 3.0, 6), np.linspace(20.0, 40.0, 6), A_S).rocking.alpha_2)
+    for other in found[1:]:
+        np.testing.assert_array_equal(other, found[0])
 
 
 def test_a_map_and_its_outcomes_are_the_same_on_workers(cluster: Any) -> None:

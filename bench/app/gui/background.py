@@ -153,7 +153,7 @@ class Command(QObject):
         self._written: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115 - closed with the process
         nice = shutil.which("nice") if sys.platform != "win32" else None
         self._process = subprocess.Popen(
-            [*([nice, "-n", "10"] if nice else []), sys.executable, "-m", "bench", *arguments],
+            [*([nice, "-n", "10"] if nice else []), sys.executable, "-P", "-m", "bench", *arguments],
             stdin=subprocess.DEVNULL,
             stdout=self._written,
             stderr=subprocess.STDOUT,

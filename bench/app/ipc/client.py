@@ -171,7 +171,7 @@ class SessionClient(ClientConnection):
         key = secrets.token_bytes(32)
         self._listener = open_listener(key)
         self.process = subprocess.Popen(
-            [sys.executable, "-m", "bench.app.ipc.process"],
+            [sys.executable, "-P", "-m", "bench.app.ipc.process"],
             stdin=subprocess.PIPE,
             stdout=self._errors,
             stderr=self._errors,
