@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable
 from importlib import reload
@@ -114,3 +115,32 @@ def test_on_windows_a_child_is_not_attached_to_the_console(
     monkeypatch.setattr(subprocess, "Popen", record)
     begin(tmp_path)
     assert flags[0] & NO_WINDOW
+
+
+def test_a_child_imports_nothing_from_the_current_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A file there may have the name of a module that the child needs."""
+    (tmp_path / "argparse.py").write_text("raise SystemExit(3)\n")
+    monkeypatch.chdir(tmp_path)
+    started = child.ChildProcess("json.tool", "--compact")
+    started.write(b'{"a": 1}')
+    started.input.close()
+    assert started.output.read().strip() == b'{"a":1}'
+    started.output.close()
+    started.end()
+
+
+def test_a_child_that_does_not_end_does_not_hold_the_program(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its thread still reads from it; the pipe stays open until both are gone."""
+    monkeypatch.setattr("drivers.daqmx.clock_watch.ENDING", 0.2)
+    watch = ClockWatch(Daq(server="127.0.0.1:1"), "no task", 1000.0)
+    gone = threading.Event()
+    stuck = threading.Thread(target=gone.wait, daemon=True)
+    stuck.start()
+    real = watch._thread  # pyright: ignore[reportPrivateUsage]
+    watch._thread = stuck  # pyright: ignore[reportPrivateUsage]
+    begun = time.monotonic()
+    watch.close()
+    assert time.monotonic() - begun < LONG
+    gone.set()
+    real.join(LONG)
+    watch.close()

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from bench.analysis.cycles import CycleAnalyser, fit_cycle, mean_waves
+from bench.analysis.signals import SIGNALS
 
 
 def _signal(t: np.ndarray, omega: float) -> np.ndarray:
@@ -83,3 +84,17 @@ def test_the_mean_of_noisy_cycles_has_no_bias_where_the_mean_of_their_peaks_has_
     assert peaks[0] == pytest.approx(1.0, abs=3.0 * error)
     assert there.mean() == pytest.approx(peaks[0], rel=1e-4)
     assert np.mean([cycle.peak[0] for cycle in cycles]) > 1.0 + 3.0 * error
+
+
+def test_cycles_with_different_numbers_of_harmonics_have_a_mean() -> None:
+    """At 15.5 rad/s and 100 samples/s, a cycle has 40 or 41 samples: nine or ten harmonics."""
+    omega, rate = 15.5, 100.0
+    t = np.arange(round(30 * 2.0 * np.pi / omega * rate)) / rate
+    signal = 2.0 * np.sin(omega * t) + 0.3 * np.cos(3.0 * omega * t)
+    cycles = CycleAnalyser(omega, rate, 0).push(np.repeat(signal[:, None], len(SIGNALS) + 1, axis=1))
+    assert len({each.coefficients.shape for each in cycles}) == 2
+    found = mean_waves(cycles)
+    expected = mean_waves([each for each in cycles if len(each.coefficients) == 19])
+    assert found.waveform.shape == expected.waveform.shape
+    np.testing.assert_allclose(found.peaks, expected.peaks, rtol=1e-6)
+    np.testing.assert_allclose(found.harmonics, 0.15, rtol=1e-6)

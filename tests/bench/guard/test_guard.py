@@ -1,11 +1,14 @@
 """The guard: what it lets through, what it refuses, and how the output ends."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bench.analysis.signals import SignalMap
+from bench.guard.conversion import Extremes
 from bench.guard.guard import Exchange, Guard
 from bench.guard.limits import Debounce, Limits, Ramps, Warnings
 from bench.guard.quantities import WatchedQuantities
@@ -14,6 +17,7 @@ from bench.guard.shaker import ShakerModel
 from bench.testing.loopback import LoopbackRig
 from drivers.errors import RigError
 from drivers.rig import Block
+from sim.channel import STOREYS
 from sim.errors import InvalidInput
 
 N = 100
@@ -512,3 +516,23 @@ def test_only_the_table_itself_runs_away() -> None:
     guard, _ = _armed(LoopbackRig({"table_displacement": lambda volts: np.full(volts.size, 0.05)}))
     last = guard.exchange(np.zeros(N))
     assert last.runaway == last.violation
+
+
+def test_the_place_of_a_storey_is_relative_to_its_lasers_measuring_range() -> None:
+    """The valid counts of an analogue laser extend beyond the range at one end only: 3.8 to 20 mA, which is the
+    converter's end.
+    """
+    rig = _bench_rig()
+    asymmetric = [
+        replace(channel, scale=1e-4, offset=0.0, valid=(-1025, 1000)) if channel.name in STOREYS else channel
+        for channel in rig.channels
+    ]
+    quantities = WatchedQuantities(tuple(asymmetric), 1000.0, 60.0, None, (0.2, 0.2))
+    names = [channel.name for channel in asymmetric]
+    for name in STOREYS:
+        for place in (0.099, -0.099):
+            values = np.zeros((3, len(names)))
+            values[1, names.index(name)] = place
+            assert quantities.of(values)["laser_range"].max() == pytest.approx(0.99, abs=1e-12)
+            bounds = quantities.bounds(values, Extremes(values.min(axis=0).tolist(), values.max(axis=0).tolist()))
+            assert bounds["laser_range"] == pytest.approx(0.99, abs=1e-12)

@@ -196,3 +196,50 @@ def test_a_session_is_prepared_once_and_read_when_it_runs(session: DaqSession) -
     with pytest.raises(InvalidInput):
         session.read(0)
     assert len(session.read(1)) == 1
+
+
+@pytest.mark.parametrize(("part", "step"), [("relay", "energise"), ("watchdog", "start"), ("output", "prepare")])
+def test_a_stop_by_a_signal_during_the_arming_leaves_nothing_enabled(
+    open_session: OpenSession, plant: Loopback, monkeypatch: pytest.MonkeyPatch, part: str, step: str
+) -> None:
+    """The handler runs in the same thread, between two steps; the interrupted call then goes on."""
+    session = open_session(watchdog=5.0)
+    interrupted = getattr(session._tasks, part)
+    real = getattr(interrupted, step)
+
+    def interrupting(*arguments: object) -> None:
+        session.cut()
+        session.stop()
+        real(*arguments)
+
+    monkeypatch.setattr(interrupted, step, interrupting)
+    with pytest.raises(RigError):
+        session.prepare()
+    assert is_safe(plant)
+    monkeypatch.undo()
+    # and the device's watchdog does not hold the relay
+    session.prepare()
+    assert plant.enabled
+
+
+def test_a_stop_by_a_signal_during_the_start_stops_the_clock(
+    session: DaqSession, plant: Loopback, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    session.prepare()
+    session.write(np.full(LEAD, 3.0))
+    inputs = session._tasks.inputs
+    real = inputs.start
+
+    def interrupting() -> None:
+        session.cut()
+        session.stop()
+        real()
+
+    monkeypatch.setattr(inputs, "start", interrupting)
+    with pytest.raises(RigError, match="start is refused"):
+        session.start()
+    monkeypatch.undo()
+    eventually(lambda: is_safe(plant))
+    with pytest.raises(RigError, match="read is refused"):
+        session.read(10)
+    assert len(started(session).read(10)) == 10
