@@ -180,8 +180,9 @@ def linearity_errors(
 ) -> LinearityErrors:
     """Errors of peaks measured by one laser with the measuring range `whole` [m] and the largest error `limit` [m].
 
-    `shares`, shape (tests,), are the derivatives of the result with respect to the peaks: without `checks`, they
-    determine the most unfavourable number of waves, which is then assumed. The evaluation of the checks is cached for
+    `shares`, shape (tests,), are the derivatives of the result with respect to the peaks: they determine the most
+    unfavourable number of waves, of all or of those that `checks` do not exclude, which is then assumed; `waves` of the
+    result is the mean number according to the checks. The evaluation of the checks is cached for
     later calls with the same objects.
     """
     tests = len(effects)

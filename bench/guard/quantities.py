@@ -21,6 +21,11 @@ usual periods of the motion.
 MOST_SKIPPED = 4000
 """Number of skipped samples after which the heating is updated."""
 
+RESERVE = 0.1
+"""Distance from zero of the middle of a laser's valid counts, relative to half their range, up to which zero is taken
+for mid range.
+"""
+
 ROUNDING = 1e-9
 """Relative allowance for the rounding errors of a mean over `MOST_SKIPPED` samples."""
 
@@ -34,8 +39,8 @@ class WatchedQuantities:
     A block is either converted by `of` or skipped: `bounds` returns upper bounds of its magnitudes, and `skip` stores
     the state required by later blocks.
 
-    `laser_ranges` are the measuring ranges of the two lasers [m], whose values are relative to mid range. Without them,
-    the range of a laser is that of its valid counts, which may have a reserve beyond the measuring range.
+    `laser_ranges` are the measuring ranges of the two lasers [m]. The valid counts of a laser may have a reserve beyond
+    the measuring range, also at one end only; without a range, or with a smaller one, they are its range.
     """
 
     def __init__(
@@ -59,9 +64,7 @@ class WatchedQuantities:
         self._skipped_samples, self._skipped_current = 0, 0.0
         ranges = {} if laser_ranges is None else dict(zip(STOREYS, laser_ranges, strict=True))
         self._places = [
-            (k, *((0.0, 0.5 * ranges[name]) if name in ranges else _middle(channels[k])))
-            for name, k in self._columns.items()
-            if name in STOREYS
+            (k, *_middle(channels[k], ranges.get(name))) for name, k in self._columns.items() if name in STOREYS
         ]
 
     @property
@@ -220,9 +223,14 @@ def _magnitude(x: Array) -> Array:
     return np.where(np.isnan(x), np.inf, np.abs(x))
 
 
-def _middle(channel: Channel) -> tuple[float, float]:
+def _middle(channel: Channel, measuring_range: float | None) -> tuple[float, float]:
+    """Middle and half of the range of a laser [m]."""
     low, high = channel.limits
-    return 0.5 * (low + high), 0.5 * (high - low)
+    middle, half = 0.5 * (low + high), 0.5 * (high - low)
+    if measuring_range is None or measuring_range >= 2.0 * half:
+        return middle, half
+    # values relative to mid range, with a reserve that may be at one end only
+    return (0.0 if abs(middle) <= RESERVE * half else middle), 0.5 * measuring_range
 
 
 def largest(x: Array) -> float:

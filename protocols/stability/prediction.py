@@ -54,10 +54,11 @@ class Predicted:
     def given(self, modulus: float, uncertainty: float) -> Self:
         """The prediction with the slopes that are expected after `modulus` was measured with the standard
         `uncertainty`, and with their remaining spread: the specimens for which the prediction is off by this much are
-        those with other slopes (normal distribution, to first order).
+        those with other slopes (normal distribution, to first order). Without a prediction on the table it is the same,
+        because the table changes the modulus as well.
         """
         total = self.variance + uncertainty**2
-        if not total > 0.0:
+        if self.table is None or not total > 0.0:
             return self
         off = (modulus - abs(self.multiplier)) / total
         return replace(

@@ -1,6 +1,7 @@
 """Child processes outlive the requests to end that reach the whole group, and end with the program."""
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -144,3 +145,16 @@ def test_a_child_that_does_not_end_does_not_hold_the_program(monkeypatch: pytest
     gone.set()
     real.join(LONG)
     watch.close()
+
+
+def test_no_process_that_is_started_imports_from_the_current_folder() -> None:
+    root = Path(child.__file__).parents[1]
+    calls = [
+        line.strip()
+        for package in ("bench", "drivers", "protocols", "sim")
+        for path in (root / package).rglob("*.py")
+        for line in path.read_text(encoding="utf-8").splitlines()
+        if re.search(r'sys\.executable, "', line)
+    ]
+    assert len(calls) >= 8
+    assert [line for line in calls if 'sys.executable, "-P"' not in line] == []

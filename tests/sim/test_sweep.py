@@ -110,8 +110,8 @@ def test_a_map_is_divided_alike_on_all_computers(cluster: Any, monkeypatch: pyte
     assert strips == [STRIPS] * 3
     for other in found[1:]:
         np.testing.assert_array_equal(other.rocking.alpha_2, found[0].rocking.alpha_2)
-    gain_map(Specimen(), [0.2], np.linspace(14.0, 20.0, 6 * WIDE), A_S)
-    assert strips[-1] == 6
+    gain_map(Specimen(), [0.2], np.linspace(14.0, 20.0, 10 * WIDE), A_S)
+    assert strips[-1] == 10
 
 
 def test_orbits_that_need_a_neighbour_do_not_depend_on_the_processors(monkeypatch: pytest.MonkeyPatch) -> None:

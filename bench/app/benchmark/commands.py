@@ -106,7 +106,7 @@ def _measured(arguments: Sequence[str], folder: Path) -> dict[str, Cell]:
     begin = time.perf_counter()
     with (folder / "messages").open("w+b") as messages:
         process = subprocess.Popen(
-            [sys.executable, "-c", code],
+            [sys.executable, "-P", "-c", code],
             cwd=folder,
             env=environment,
             stdin=subprocess.DEVNULL,

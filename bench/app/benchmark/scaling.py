@@ -153,7 +153,7 @@ def _run(cache: Path) -> tuple[float, float | None]:
     before = os.times()
     elapsed, done = once(
         lambda: subprocess.run(
-            [sys.executable, "-c", code],
+            [sys.executable, "-P", "-c", code],
             env=os.environ | {"NUMBA_CACHE_DIR": str(cache)},
             capture_output=True,
             text=True,

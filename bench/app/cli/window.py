@@ -108,7 +108,7 @@ def require_display() -> None:
         raise NoDisplay("DISPLAY", why, "start it on a desktop or over `ssh -X`")
     try:
         probe = subprocess.run(
-            [sys.executable, "-c", PROBE],
+            [sys.executable, "-P", "-c", PROBE],
             env=os.environ | {"QT_DEBUG_PLUGINS": "1"},
             capture_output=True,
             text=True,

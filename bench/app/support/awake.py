@@ -21,7 +21,7 @@ INHIBITION = ("--what=sleep:idle", "--who=rockbench", "--why=a run is under way"
 COMMANDS = {
     "linux": (
         *("systemd-inhibit", *INHIBITION),
-        *(sys.executable, "-c", "import sys; sys.stdin.read()"),
+        *(sys.executable, "-P", "-c", "import sys; sys.stdin.read()"),
     ),
     "darwin": ("caffeinate", "-i", "-w", str(os.getpid())),
 }

@@ -536,3 +536,22 @@ def test_the_place_of_a_storey_is_relative_to_its_lasers_measuring_range() -> No
             assert quantities.of(values)["laser_range"].max() == pytest.approx(0.99, abs=1e-12)
             bounds = quantities.bounds(values, Extremes(values.min(axis=0).tolist(), values.max(axis=0).tolist()))
             assert bounds["laser_range"] == pytest.approx(0.99, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("valid", "asked", "middle", "half"),
+    [((-500, 500), 0.2, 0.0, 0.05), ((0, 2000), 0.2, 0.1, 0.1), ((-1020, 1020), 0.2, 0.0, 0.1)],
+)
+def test_a_laser_that_reads_less_or_from_its_start_keeps_its_own_range(
+    valid: tuple[int, int], asked: float, middle: float, half: float
+) -> None:
+    """A plug-in may leave the configured ranges at their default."""
+    channels = tuple(
+        replace(channel, scale=1e-4, offset=0.0, valid=valid) if channel.name in STOREYS else channel
+        for channel in _bench_rig().channels
+    )
+    quantities = WatchedQuantities(channels, 1000.0, 60.0, None, (asked, asked))
+    values = np.zeros((1, len(channels)))
+    for name in STOREYS:
+        values[:, [channel.name for channel in channels].index(name)] = middle + 0.9 * half
+    assert quantities.of(values)["laser_range"].max() == pytest.approx(0.9, abs=1e-12)
