@@ -155,7 +155,7 @@ def test_devices_are_asked_for_by_the_command_and_the_window_goes_on(
     assert panel.message.text() == texts.FINDING
     assert not panel.ask.isEnabled()
     qtbot.waitUntil(lambda: panel.message.text() == texts.FOUND, timeout=LONG_MS)
-    assert panel.found.toPlainText() == "NI devices: -m bench devices"
+    assert panel.found.toPlainText() == "NI devices: -P -m bench devices"
     panel.use(window.setup.configuration, tmp_path / "refused")
     panel.look()
     qtbot.waitUntil(lambda: "search for devices failed" in panel.message.text(), timeout=LONG_MS)
