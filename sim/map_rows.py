@@ -19,7 +19,7 @@ from sim.sweep import Done, connection, sweep
 
 Floats = NDArray[np.float64]
 
-STRIPS, WIDE = 8, 125
+STRIPS, WIDE = 4, 125
 """Smallest number of strips of columns, and largest number of columns of a strip if there are more strips: enough of
 them to balance the load, but wide ones. The number of processors has no influence on the strips, because an orbit may
 be found from its neighbour in the same strip only.
