@@ -1,11 +1,11 @@
 """Peaks of free motions of drawn benches, against the simulator's own samples.
 
-    python -m tests.benchmarks.free_peaks [--seeds 100] [--points 15:0.97 12.5:0.64] [--share 0.04]
+    python -m tests.benchmarks.free_peaks [--seeds 100] [--points 15:0.97 12.5:0.64] [--share 0.04] [--scales]
 
-Each run is `rockbench run harmonic --no-hold` at one point on the simulated bench, with specimen and scales of the
-sensors drawn as in `tests.benchmarks.hold`. The true gains are those of the largest true drift within a period that
-slides over the cycles that the bench evaluated: least, mean and greatest, over the mean of the bare frame in its
-measured cycles.
+Each run is `rockbench run harmonic --no-hold` at one point on the simulated bench, with the specimen drawn as in
+`tests.benchmarks.hold`, and with `--scales` the scales of the sensors as well. The true gains are those of the largest
+true drift within a period that slides over the cycles that the bench evaluated: least, mean and greatest, over the mean
+of the bare frame in its measured cycles.
 Printed for each run: error in per cent and in expanded uncertainties. In the end, for each quantity: rms of e, the
 share of the intervals that contain the truth, and the share of the predicted ranges that contain it.
 """
@@ -96,10 +96,12 @@ def witnessed() -> Generator[Witness]:
         yield witness
 
 
-def free_peaks(omega: float, beta: float, seed: int, share: float, options: list[str]) -> tuple[dict[str, Any], Any]:
+def free_peaks(
+    omega: float, beta: float, seed: int, share: float, options: list[str], *, scales: bool
+) -> tuple[dict[str, Any], Any]:
     """The point of one run, and the estimates by name; none if the motion became steady or the block fell."""
     with witnessed() as witness:
-        point = measured(omega, beta, seed, share, ["--no-hold", *options], scales=True)
+        point = measured(omega, beta, seed, share, ["--no-hold", *options], scales=scales)
     if point["status"] != "modulated":
         return point, {}
     true = witness.peaks / witness.bare
@@ -116,6 +118,7 @@ def study() -> None:
     parser.add_argument("--first", type=int, default=1)
     parser.add_argument("--share", type=float, default=0.04)
     parser.add_argument("--points", nargs="+", default=["15:0.97", "12.5:0.64"])
+    parser.add_argument("--scales", action="store_true", help="draw the scales of the sensors as well")
     parser.add_argument("--options", nargs=argparse.REMAINDER, default=[])
     asked = parser.parse_args()
     for text in asked.points:
@@ -123,7 +126,7 @@ def study() -> None:
         found: dict[str, list[Estimate]] = {name: [] for name in NAMES}
         inside: dict[str, list[bool]] = {name: [] for name in NAMES}
         for seed in range(asked.first, asked.first + asked.seeds):
-            point, estimates = free_peaks(omega, beta, seed, asked.share, asked.options)
+            point, estimates = free_peaks(omega, beta, seed, asked.share, asked.options, scales=asked.scales)
             row = f"{omega:g} {beta:g} seed {seed}: {point['status']}, {point.get('cycles_measured')} cycles"
             for name, each in estimates.items():
                 found[name].append(each)

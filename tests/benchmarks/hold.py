@@ -5,9 +5,10 @@
 Each run is `rockbench run harmonic` at one point on the simulated bench, whose true storeys and spring are off by up to
 `--share` (rectangular), its damping by 30 % and its restitution by 1 %. Printed for each: status, cycles until the
 capture, control, and the error of alpha_2 against the orbit of the true specimen on fixed ground at the achieved
-amplitudes, relative and in stated uncertainties. In the end: shares captured, held and within the uncertainty. A run
-takes 7 to 15 s. With `--scales`, the scales of lasers and table sensors are off as well, by what the budget assumes of
-them; without, the interval is wide for what is drawn.
+amplitudes, relative and in stated uncertainties. In the end: shares captured, held and within the uncertainty, and for
+every limited quantity the least margin of all runs, as a whole and while holding, against the margins that the
+preflight stated. A run takes 7 to 15 s. With `--scales`, the scales of lasers and table sensors are off as well, by
+what the budget assumes of them; without, the interval is wide for what is drawn.
 """
 
 import argparse
@@ -26,6 +27,7 @@ from sim.gain import predict_gain
 from sim.knowledge import SpecimenKnowledge
 from sim.specimen import Specimen
 from tests.benchmarks.coverage_sensors import ACCURACY
+from tests.benchmarks.limit_margins import MarginCount, demands_watched, stated_margins
 
 
 def drawn(share: float, seed: int) -> tuple[Specimen, float]:
@@ -82,6 +84,7 @@ def measured(
         if status != 0:
             return {"status": "failed", "reason": told.getvalue()[-500:]}
         (point,) = json.loads(Path(f"{folder}/run/summary.json").read_text(encoding="utf-8"))["points"]
+        point["stated_margins"] = stated_margins(Path(folder) / "run" / "campaign.h5")
     if point["status"] == "held":
         # a spring that is not the nominal one: beta of the true k_c over the true k1
         true = specimen.coupled(beta * factor * BenchConfiguration().specimen.frame.k1 / specimen.frame.k1)
@@ -102,10 +105,12 @@ def study() -> None:
     asked = parser.parse_args()
     for text in asked.points:
         omega, beta = map(float, text.split(":"))
-        points = list[dict[str, Any]]()
+        points, margins = list[dict[str, Any]](), MarginCount()
         for seed in range(asked.first, asked.first + asked.seeds):
-            point = measured(omega, beta, seed, asked.share, asked.options, scales=asked.scales)
+            with demands_watched() as demands:
+                point = measured(omega, beta, seed, asked.share, asked.options, scales=asked.scales)
             points.append(point)
+            margins.add(demands, point.get("stated_margins", {}))
             row = f"{omega:g} {beta:g} seed {seed}: {point['status']}"
             if point.get("truth"):
                 error = point["alpha_2"] / point["truth"] - 1.0
@@ -121,6 +126,7 @@ def study() -> None:
         steady = sum(point["status"] == "steady" for point in points)
         inside = sum(abs(p["alpha_2"] - p["truth"]) <= p["alpha_2_uncertainty"] for p in held)
         print(f"{omega:g} {beta:g}: held {len(held)}, steady {steady}, of {len(points)}; within U {inside}", flush=True)
+        print(*margins.rows(), sep="\n", flush=True)
 
 
 if __name__ == "__main__":
