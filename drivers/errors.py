@@ -63,6 +63,10 @@ class SafetyInputOpen(RigError):
         return Cause(self.error_code, ", ".join(self.inputs))
 
 
+class SafetyInputOpened(SafetyInputOpen):
+    """The inputs opened after the rig was armed, before its first block; the enable line was cut."""
+
+
 class EnableLineCut(RigError):
     """Arming is refused because the enable line was cut meanwhile. Further errors may be appended to the text."""
 

@@ -12,6 +12,7 @@ from bench.engine.stalls import Stalls, in_words
 from bench.events import Acquired, SensorsAligned, State, StateChanged, ValuesReceived, Warned
 from bench.guard.guard import Exchange, Guard
 from drivers.clock import now
+from drivers.errors import SafetyInputOpened
 from drivers.rig import Rig, RigError
 from sim.errors import UNKNOWN, Cause, CauseCode, InvalidInput, RockbenchError
 
@@ -263,6 +264,8 @@ class Output:
             work()
         except Ended as ended:
             return ended.ending
+        except SafetyInputOpened as error:
+            return self.cut(Ending("halted", str(error), error.cause))
         except RigError as error:
             if self._requests.strongest == "halt" and self.driven:
                 # the requesting thread cut the enable line during the iteration

@@ -16,7 +16,7 @@ from drivers.daqmx.parameters import AUTOMATIC
 from drivers.daqmx.session import DaqSession
 from drivers.drive import REARM, RigBase, RigState, require_block
 from drivers.emulation.control import ask, place_of
-from drivers.errors import RigError, SafetyInputOpen
+from drivers.errors import RigError, SafetyInputOpened
 from drivers.further import FurtherChannel
 from drivers.hardware.channels import analogue_channels, require_input_range
 from drivers.hardware.ownership import devices_of, owned
@@ -193,7 +193,7 @@ class HardwareRig(RigBase):
         for chunk in np.array_split(np.arange(self.skipped), ceil(self.skipped / (_CHUNK * self.sample_rate))):
             self._daq.read(chunk.size)
             if opened := [name for name, is_good in self._daq.safety_inputs().items() if not is_good]:
-                raise SafetyInputOpen(f"{', '.join(opened)} opened before the first sample of the run", opened)
+                raise SafetyInputOpened(f"{', '.join(opened)} opened before the first sample of the run", opened)
             self._observe_clock(tracks, _READINGS)
         others = tracks.mark(pulses, self.lead)
         if others and self._must_follow:

@@ -33,7 +33,7 @@ from bench.engine.steps import (
 from bench.events import Acquired, Event, LimitExceeded, OperatorAsked, State, StateChanged, StepStarted, Warned
 from bench.guard.limits import Limits
 from bench.testing.loopback import LoopbackBench, LoopbackRig
-from drivers.errors import ConnectionLost, DriveUnderflow, EnableLineCut
+from drivers.errors import ConnectionLost, DriveUnderflow, EnableLineCut, SafetyInputOpened
 from drivers.rig import Block, OperatorTask, RigError
 from sim.errors import Cause, RockbenchError
 from sim.specimen import Specimen
@@ -492,6 +492,18 @@ def test_the_cause_of_a_limit_is_its_quantity_and_of_a_safety_input_its_name() -
     opened = Bench()
     opened.rig.safety = {"emergency stop": False}
     assert opened.run(_plan(*RUN)).cause == Cause("safety_input", "emergency stop")
+
+
+def test_a_safety_input_that_opens_before_the_first_block_halts_the_bench() -> None:
+    class Opened(LoopbackRig):
+        def read(self, n: int) -> Block:  # noqa: ARG002
+            raise SafetyInputOpened("emergency stop opened before the first sample of the run", ["emergency stop"])
+
+    bench = Bench(Opened())
+    ending = bench.run(_plan(*RUN))
+    assert (ending.status, ending.cause) == ("halted", Cause("safety_input", "emergency stop"))
+    assert bench.rig.halted
+    assert bench.states()[-2:] == [State.HALTED, State.CLOSED]
 
 
 def test_a_limit_that_cuts_opens_the_enable_line_without_a_ramp() -> None:
