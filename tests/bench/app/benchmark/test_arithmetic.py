@@ -37,7 +37,8 @@ def test_the_loop_of_the_peak_carries_out_its_multiply_adds() -> None:
 
 
 def test_the_section_states_share_and_peak_of_a_run_and_of_lanes() -> None:
-    section = arithmetic(1)
+    # the times are minima: a single run may be interrupted by other processes for longer than it takes
+    section = arithmetic(20)
     assert [row["method"] for row in section.rows] == ["single run", "members in lanes"]
     for row in section.rows:
         rate, peak, share = (float(row[key] or 0.0) for key in ("rate", "peak", "share"))
