@@ -7,20 +7,17 @@ from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
-import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.config.model import BenchConfiguration
+from bench.datafile.reader import open_datafile
 from bench.guard.guard import Exchange, Guard
-from bench.guard.motion import WATCHED
+from bench.preflight.margins import bounds
 from protocols.harmonic import plan
-from sim.channel import STOREYS
 
-NAMES = {key: name for key, (name, _) in WATCHED.items() if key != "laser_range"} | {
-    "drive_voltage": "drive",
-    **{name: f"fraction of laser {number}'s half range" for number, name in enumerate(STOREYS, start=1)},
-}
-"""Name in the preflight's table of each quantity that the guard displays, and of the drive."""
+NAMES = {key: bound.name for key, bound in bounds(BenchConfiguration()).items()}
+"""Name of each limited quantity in the preflight's table."""
 
 
 @dataclass
@@ -74,45 +71,36 @@ class Stated:
 
 def stated_margins(file: Path) -> dict[str, Stated]:
     """Predicted margins that the preflight wrote to a campaign's file, by name of the quantity."""
-    with h5py.File(file) as opened:
-        table: Any = opened["entry/preflight"]
-        columns = (table[name][:].tolist() for name in ("quantity", "limit", "margin", "margin_95"))
-        rows = [
-            (name.decode(), Stated(limit, margin, likely)) for name, limit, margin, likely in zip(*columns, strict=True)
-        ]
-    return {name: stated for name, stated in rows if not np.isnan(stated.margin)}
+    with open_datafile(file) as record:
+        table = record.tables["preflight"]
+        columns = (table[name].values.tolist() for name in ("quantity", "limit", "margin", "margin_95"))
+        rows = list(zip(*columns, strict=True))
+    return {name: Stated(limit, margin, likely) for name, limit, margin, likely in rows if not np.isnan(margin)}
 
 
 @dataclass
 class MarginCount:
-    """Margins of several runs against the stated ones."""
+    """Margins of several runs beside the stated ones, by part of the run and name of the quantity."""
 
     runs: int = 0
-    below: dict[str, dict[str, list[float]]] = field(default_factory=dict[str, dict[str, list[float]]])
-    least: dict[str, dict[str, tuple[float, Stated]]] = field(
-        default_factory=dict[str, dict[str, tuple[float, Stated]]]
+    found: dict[tuple[str, str], list[tuple[float, Stated]]] = field(
+        default_factory=dict[tuple[str, str], list[tuple[float, Stated]]]
     )
 
     def add(self, demands: Demands, stated: dict[str, Stated]) -> None:
         self.runs += 1
-        for part, found in ("whole run", demands.whole), ("hold", demands.held):
-            for name, each in stated.items():
-                if name not in found:
-                    continue
-                margin = 1.0 - found[name] / each.limit
-                lacking = self.below.setdefault(part, {}).setdefault(name, [])
-                if margin < each.likely:
-                    lacking.append(each.likely - margin)
-                least = self.least.setdefault(part, {})
-                if name not in least or margin < least[name][0]:
-                    least[name] = margin, each
+        for part, largest in ("whole run", demands.whole), ("hold", demands.held):
+            for name in largest.keys() & stated.keys():
+                each = stated[name]
+                self.found.setdefault((part, name), []).append((1.0 - largest[name] / each.limit, each))
 
     def rows(self) -> Generator[str]:
-        for part, found in self.least.items():
-            for name, (margin, stated) in sorted(found.items(), key=lambda item: item[1][0]):
-                lacking = self.below[part][name]
-                yield (
-                    f"{part}, {name}: least margin {100 * margin:.1f} %, stated there {100 * stated.margin:.1f} % and "
-                    f"{100 * stated.likely:.1f} % (95 % of the specimens); below the latter in {len(lacking)} of "
-                    f"{self.runs} runs" + (f", by {100 * max(lacking):.1f} points at most" if lacking else "")
-                )
+        """A line for each part and quantity, those with the least margin first in each part."""
+        least = {key: min(margins, key=lambda one: one[0]) for key, margins in self.found.items()}
+        for (part, name), (margin, stated) in sorted(least.items(), key=lambda one: (one[0][0] == "hold", one[1][0])):
+            lacking = [each.likely - own for own, each in self.found[part, name] if own < each.likely]
+            yield (
+                f"{part}, {name}: least margin {100 * margin:.1f} %, stated there {100 * stated.margin:.1f} % and "
+                f"{100 * stated.likely:.1f} % (95 % of the specimens); below the latter in {len(lacking)} of "
+                f"{self.runs} runs" + (f", by {100 * max(lacking):.1f} points at most" if lacking else "")
+            )
