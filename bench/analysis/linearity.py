@@ -182,8 +182,8 @@ def linearity_errors(
 
     `shares`, shape (tests,), are the derivatives of the result with respect to the peaks: they determine the most
     unfavourable number of waves, of all or of those that `checks` do not exclude, which is then assumed; `waves` of the
-    result is the mean number according to the checks. The evaluation of the checks is cached for
-    later calls with the same objects.
+    result is the mean number according to the checks. The evaluation of the checks is cached for later calls with the
+    same objects.
     """
     tests = len(effects)
     if limit == 0.0:
