@@ -54,7 +54,8 @@ class Cycle:
     the fitted motion, including its mean; `noise` is the rms of the residual; shape (m,) each. `extreme`, shape (m,),
     is the largest magnitude of the smoothed samples. It replaces `peak` for an unsteady motion, which the fit
     overshoots because the motion differs between the two ends of the cycle. `traces` [m], shape (n, 3), are all samples
-    of the drift and of both lasers, missing ones interpolated; no rows if there are no such signals.
+    of the drift and of both lasers, missing ones interpolated; no rows if there are no such signals. `first` is the
+    index of the first sample, counted like the phase.
     """
 
     index: int
@@ -65,6 +66,7 @@ class Cycle:
     extreme: NDArray[np.float64]
     noise: NDArray[np.float64]
     traces: NDArray[np.float32]
+    first: int = 0
 
     def harmonics(self, column: int) -> NDArray[np.complex128]:
         """Complex amplitudes z_k of one signal, shape (HARMONICS,): the signal is its mean plus Im(sum of z_k exp(i k
@@ -80,7 +82,7 @@ class Cycle:
 
 
 def fit_cycle(
-    index: int, phase: NDArray[np.float64], values: NDArray[np.float64], highest: int = HARMONICS
+    index: int, phase: NDArray[np.float64], values: NDArray[np.float64], highest: int = HARMONICS, first: int = 0
 ) -> Cycle | None:
     """Fit samples `values`, shape (n, m), at `phase` [rad] up to the harmonic `highest`, or up to a lower harmonic if
     there are few samples. Returns None if too many samples are missing (NaN) or there are too few for one harmonic.
@@ -106,6 +108,7 @@ def fit_cycle(
         extreme=_extreme(values),
         noise=np.sqrt(np.mean(residual**2, axis=0)),
         traces=traces,
+        first=first,
     )
 
 
@@ -266,7 +269,7 @@ class CycleAnalyser:
         while self._start + queue.shape[0] >= self._end():
             n = self._end() - self._start
             phase = self._step * np.arange(self._start, self._start + n, dtype=np.float64)
-            cycle = fit_cycle(self._count, phase, queue[:n], self._highest)
+            cycle = fit_cycle(self._count, phase, queue[:n], self._highest, self._start)
             if cycle is not None:
                 cycles.append(cycle)
             queue = queue[n:]

@@ -1,8 +1,8 @@
 """Lines of the loop check that compare the sensors under a common motion."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from math import inf, isinf, sqrt
+from dataclasses import dataclass
+from math import inf, isinf
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,34 +11,11 @@ from bench.analysis.check_line import CheckLine, judged, stated
 from bench.analysis.gain import COVERAGE
 from bench.analysis.uncertainty import student_factor
 from bench.config.model import BenchConfiguration
-from drivers.timebase.common_motion import CommonMotion, common_motion
 from protocols.check.protocol import CheckParameters
+from protocols.check.sines import STOREY_SIGNALS, Amplitudes, LaserDelays, Sines, delay_between
 from sim.channel import STOREYS, TABLE_ACCELERATION, TABLE_DISPLACEMENT
 from sim.linear import steady_response
 from sim.specimen import Specimen
-
-Amplitudes = NDArray[np.complex128]
-
-
-@dataclass(frozen=True)
-class Sines:
-    """Complex amplitudes c at `omega` [rad/s], shape (n,) each, with signal = Re(c exp(-i omega t)).
-
-    With lasers on the ground, the four sensors measure a common motion. `drive` is in volts and `acceleration` in m/s2;
-    all other amplitudes are displacements [m]. `accelerometer` is the displacement computed as acceleration / -omega^2.
-    """
-
-    omega: NDArray[np.float64]
-    drive: NDArray[np.complex128]
-    acceleration: NDArray[np.complex128]
-    displacement: NDArray[np.complex128]
-    storey_1: NDArray[np.complex128]
-    storey_2: NDArray[np.complex128]
-
-    @property
-    def accelerometer(self) -> NDArray[np.complex128]:
-        """Table displacement from the accelerometer [m]: x'' = -omega^2 x."""
-        return -self.acceleration / self.omega**2
 
 
 @dataclass(frozen=True)
@@ -61,7 +38,7 @@ LASERS = {
         f"hardware.{name}.polarity",
         f"hardware.{name}.measuring_range (on the analogue output also hardware.lasers.load)",
     )
-    for name, signal in zip(STOREYS, ("storey_1", "storey_2"), strict=True)
+    for name, signal in zip(STOREYS, STOREY_SIGNALS, strict=True)
 }
 
 SENSORS = TABLE | LASERS
@@ -90,38 +67,28 @@ _SKEW = (
 )
 
 
-def held_for(configuration: BenchConfiguration) -> float:
-    """Time [s] for which the readings of a laser are held. Those of serial lasers are placed at the times of their
-    measurement.
-    """
-    serial = configuration.backend == "hardware" and configuration.hardware.lasers.connection == "serial"
-    return 0.0 if serial else configuration.analysis.laser_timing
-
-
 def table_delay_lines(
     sines: Sines,
     parameters: CheckParameters,
     sample_rate: float,
     *,
-    lasers: bool,
+    lasers: LaserDelays | None = None,
     most: float = inf,
-    timing: float = 0.0,
 ) -> Iterator[CheckLine]:
-    """Lines for the delay of the accelerometer against the table's displacement sensor and, with `lasers` on the
-    ground, of each laser against the accelerometer; the latter has limits if `most` [s], its largest magnitude, is
-    finite. `timing` is that of `laser_delay`. Together with `delay_lines`, every pair of these channels is compared.
+    """Lines for the delay of the accelerometer against the table's displacement sensor and, for `lasers` on the ground,
+    of each laser against the accelerometer, from `laser_delays`; the latter has limits if `most` [s], its largest
+    magnitude, is finite. Together with `delay_lines`, every pair of these channels is compared.
 
     The limits include half a sample: the lag of an acceleration that follows each step of the zero-order-hold output.
     """
     if parameters.delay_tolerance is None:
         return
     pair = delay_between(sines.omega, sines.displacement, sines.accelerometer)
-    storeys = dict(zip(STOREYS, (sines.storey_1, sines.storey_2), strict=True)) if lasers else {}
-    against = {name: laser_delay(sines.omega, sines.accelerometer, seen, timing) for name, seen in storeys.items()}
+    against = {} if lasers is None else dict(zip(STOREYS, (lasers.first, lasers.second), strict=True))
     middle = float(np.mean([one.delay for one in against.values()])) if against else np.nan
     # the lasers lag behind the correct sensor only by their latency, so the sensor nearer to them is assumed correct
     alone = TABLE_ACCELERATION if abs(middle + pair.delay) < abs(middle) else TABLE_DISPLACEMENT
-    odd = f"{alone} differs from the lasers: " if lasers else ""
+    odd = f"{alone} differs from the lasers: " if against else ""
     yield judged(
         TABLE_ACCELERATION,
         f"delay against {TABLE_DISPLACEMENT}",
@@ -145,28 +112,6 @@ def table_delay_lines(
 def _allowed_of_table(tolerance: float, sample_rate: float) -> tuple[float, float]:
     """Limits [s] of the delay of the accelerometer against the table's displacement sensor."""
     return -tolerance, tolerance + 0.5 / sample_rate
-
-
-def delay_between(omega: NDArray[np.float64], first: Amplitudes, second: Amplitudes) -> CommonMotion:
-    """Delay of the second signal against the first; its standard uncertainty follows Student's t, since the scatter of
-    few phases about a line determines it only roughly.
-    """
-    # the amplitudes are for exp(-i omega t), those of `common_motion` for exp(+i omega t)
-    found = common_motion(omega, first.conj(), second.conj())
-    return replace(found, uncertainty=student_factor(omega.size) * found.uncertainty)
-
-
-def laser_delay(omega: NDArray[np.float64], table: Amplitudes, laser: Amplitudes, timing: float) -> CommonMotion:
-    """Delay of a laser against the table, whose readings are held until the next one: their age is uniform between 0
-    and `timing` [s], 0 for readings that are placed at the times of their measurement.
-
-    The mean delay over all ages is stated. If the laser's clock runs almost like the sample clock, the ages at all
-    frequencies are similar, without scatter; if it drifts, they are spread over the interval. The variance of their
-    mean is therefore that of an age minus their spread (law of total variance), but at least that of the scatter.
-    """
-    found = delay_between(omega, table, laser)
-    of_age = max(timing**2 / 12.0 - found.spread**2, 0.0)
-    return replace(found, uncertainty=max(found.uncertainty, sqrt(of_age)))
 
 
 def scale_lines(sines: Sines, parameters: CheckParameters, *, lasers: bool) -> Iterator[CheckLine]:
@@ -206,25 +151,25 @@ def scale_lines(sines: Sines, parameters: CheckParameters, *, lasers: bool) -> I
         )
 
 
-def delay_lines(sines: Sines, parameters: CheckParameters, configuration: BenchConfiguration) -> Iterator[CheckLine]:
-    """Lines for the delay of each laser and for the difference of the delays; for serial lasers of a real bench, also
+def delay_lines(
+    sines: Sines, lasers: LaserDelays, parameters: CheckParameters, configuration: BenchConfiguration
+) -> Iterator[CheckLine]:
+    """Lines for the delay of each laser against the table's displacement sensor, from `laser_delays`, and for the
+    difference of the delays; for serial lasers of a real bench, also
     the value of the setting that compensates the mean delay, unless the table's sensors contradict each other.
 
     A delay is positive if the laser lags behind the table's displacement.
     """
-    omega = sines.omega
     most = allowed_delay(configuration.known_specimen, parameters.highest_omega, parameters.u1_error)
     hardware = configuration.hardware.lasers
     settable = configuration.backend == "hardware" and hardware.connection == "serial"
-    timing = held_for(configuration)
-    found = [laser_delay(omega, sines.displacement, seen, timing) for seen in (sines.storey_1, sines.storey_2)]
-    difference, between = found[1].delay - found[0].delay, COVERAGE * configuration.analysis.laser_timing
+    between = COVERAGE * configuration.analysis.laser_timing
     differs = _table_differs(sines, parameters, configuration.sample_rate)
-    for name, motion in zip(STOREYS, found, strict=True):
+    for name, motion in zip(STOREYS, (lasers.first, lasers.second), strict=True):
         if differs:
             remedy = _TABLE_FIRST
         elif settable:
-            unequal = abs(difference) > between
+            unequal = abs(lasers.difference) > between
             remedy = _UNEQUAL if unequal else "set hardware.lasers.delay to the value in the last line"
         else:
             remedy = _OWN_LATENCY if motion.delay > 0.0 else _AHEAD
@@ -238,20 +183,21 @@ def delay_lines(sines: Sines, parameters: CheckParameters, configuration: BenchC
             expected=0.0,
             uncertainty=COVERAGE * motion.uncertainty,
         )
-    expanded = COVERAGE * float(np.hypot(found[0].uncertainty, found[1].uncertainty))
     yield judged(
         "lasers",
         f"delay of {STOREYS[1]} against {STOREYS[0]}",
-        difference,
+        lasers.difference,
         (-between, between),
         "s",
         "set both lasers to the same rate, averaging and output; check that neither of them loses values",
         expected=0.0,
-        uncertainty=expanded,
+        uncertainty=COVERAGE * lasers.uncertainty,
     )
     if settable and not differs:
-        value = hardware.delay - 0.5 * (found[0].delay + found[1].delay)
-        yield stated("lasers", "correct value of hardware.lasers.delay", value, "s", uncertainty=0.5 * expanded)
+        value = hardware.delay - 0.5 * (lasers.first.delay + lasers.second.delay)
+        # the noise of the table's sensor is in both: they may be wholly correlated
+        expanded = 0.5 * COVERAGE * (lasers.first.uncertainty + lasers.second.uncertainty)
+        yield stated("lasers", "correct value of hardware.lasers.delay", value, "s", uncertainty=expanded)
 
 
 def _table_differs(sines: Sines, parameters: CheckParameters, sample_rate: float) -> bool:

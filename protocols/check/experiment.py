@@ -12,10 +12,9 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bench.analysis.check_line import CheckLine, Verdict, failed, untested
-from bench.analysis.signals import ACCELERATION, DISPLACEMENT, LASER_1, LASER_2, SIGNALS
+from bench.analysis.cycles import Cycle
 from bench.config.model import BenchConfiguration
 from bench.control.oscillator import Segment
 from bench.datafile.tables import Column, Table
@@ -40,9 +39,10 @@ from bench.figures.style import BLUE, GREY, VERMILLION, new_figure, set_grid, wr
 from bench.figures.text_table import TextColumn, text_table
 from bench.protocol import Plan, Prepared, Result, Sources
 from drivers.rig import OperatorTask
-from protocols.check.comparison import Sines, allowed_delay, delay_lines, held_for, scale_lines, table_delay_lines
+from protocols.check.comparison import allowed_delay, delay_lines, scale_lines, table_delay_lines
 from protocols.check.lines import alignment_lines, drive_lines, expected_drive, input_lines, resting_lines, safety_lines
 from protocols.check.protocol import MARKS, CheckParameters, allowed_range, number
+from protocols.check.sines import divided, held_for, laser_delays
 from protocols.common.calibrate import (
     CHANGE_TIME,
     SETTLING,
@@ -67,7 +67,6 @@ WIDTH = 118
 _OUTSIDE = 1.5
 """Position at which values far beyond their limits are drawn, in units of half the allowed range."""
 
-_DRIVE = len(SIGNALS)
 _FALLEN = "storey 1 has a permanent offset although there is no block on the table: check lasers and specimen"
 
 _CLAMP = (
@@ -166,21 +165,26 @@ def _clamped_steps(parameters: CheckParameters, configuration: BenchConfiguratio
 def _motion(parameters: CheckParameters, configuration: BenchConfiguration) -> Generator[Step, Outcome, None]:
     yield Arm(REST)
     try:
-        sines = yield from _measured_sines(parameters)
+        measured = yield from _measured(parameters)
     except Unmeasurable as error:
         yield RampOut(fast=True)
         yield from _publish([failed("bench", "motion", str(error))])
         return
     yield RampOut()
+    parts, windows = divided(measured, configuration.sample_rate)
+    sines = parts.means()
     on_ground = configuration.laser_reference == "ground"
     yield from _publish(drive_lines(sines, parameters, configuration))
     yield from _publish(scale_lines(sines, parameters, lasers=on_ground))
     most = allowed_delay(configuration.known_specimen, parameters.highest_omega, parameters.u1_error)
     rate = configuration.sample_rate
-    timing = held_for(configuration)
-    yield from _publish(table_delay_lines(sines, parameters, rate, lasers=on_ground, most=most, timing=timing))
-    if on_ground:
-        yield from _publish(delay_lines(sines, parameters, configuration))
+    accelerometer, displacement = (
+        laser_delays(parts, windows, table, held_for(configuration), rate) if on_ground else None
+        for table in ("accelerometer", "displacement")
+    )
+    yield from _publish(table_delay_lines(sines, parameters, rate, lasers=accelerometer, most=most))
+    if displacement is not None:
+        yield from _publish(delay_lines(sines, displacement, parameters, configuration))
     else:
         remedy = "lasers on the table do not measure its motion: mount them on the ground for this test"
         yield from _publish([untested("lasers", "polarity, scale and delay", remedy)])
@@ -191,8 +195,8 @@ def _publish(lines: Iterable[CheckLine]) -> Generator[Step, Outcome, None]:
         yield Publish(PointFinished(line))
 
 
-def _measured_sines(parameters: CheckParameters) -> Generator[Step, Outcome, Sines]:
-    """Calibrate the drive, then measure the sines of all frequencies. Raises Unmeasurable if the response is
+def _measured(parameters: CheckParameters) -> Generator[Step, Outcome, list[tuple[float, Sequence[Cycle]]]]:
+    """Calibrate the drive, then measure the cycles at all frequencies. Raises Unmeasurable if the response is
     insufficient.
     """
     omegas = sorted(parameters.omega)
@@ -203,7 +207,7 @@ def _measured_sines(parameters: CheckParameters) -> Generator[Step, Outcome, Sin
     if isinstance(calibration, Fallen):
         raise Unmeasurable(_FALLEN)
     yield Calibrate(calibration)
-    found: list[NDArray[np.complex128]] = []
+    found: list[tuple[float, Sequence[Cycle]]] = []
     for index, omega in enumerate(omegas):
         yield Publish(StepStarted(f"common motion at {omega:g} rad/s"))
         yield Publish(_progress(omegas, index, parameters))
@@ -211,18 +215,9 @@ def _measured_sines(parameters: CheckParameters) -> Generator[Step, Outcome, Sin
         outcome = yield Dwell(SETTLING + parameters.cycles)
         if not isinstance(outcome, Measured):
             raise Unmeasurable(_FALLEN)
-        cycles = complete_cycles(outcome, parameters.cycles)
-        found.append(np.mean([cycle.fundamental for cycle in cycles], axis=0))
+        found.append((omega, complete_cycles(outcome, parameters.cycles)))
     yield Publish(Progress(1.0, 0.0, "common motion finished"))
-    columns = np.array(found).T
-    return Sines(
-        omega=np.array(omegas),
-        drive=columns[_DRIVE],
-        acceleration=columns[ACCELERATION],
-        displacement=columns[DISPLACEMENT],
-        storey_1=columns[LASER_1],
-        storey_2=columns[LASER_2],
-    )
+    return found
 
 
 def _progress(omegas: list[float], index: int, parameters: CheckParameters) -> Progress:

@@ -13,8 +13,8 @@ from bench.config.model import BenchConfiguration
 from bench.engine.steps import RestSamples
 from drivers.rig import Alignment, Channel, Counts
 from drivers.timebase.marking import expected_uncertainty
-from protocols.check.comparison import Sines
 from protocols.check.protocol import CheckParameters
+from protocols.check.sines import Sines
 from protocols.common.missing import cause
 from sim.channel import STOREYS, TABLE_ACCELERATION, TABLE_DISPLACEMENT
 

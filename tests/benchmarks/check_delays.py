@@ -5,13 +5,14 @@ up to `coverage_sensors.CLOCK` (rectangular). Against the table's displacement, 
 laser has that of its latency and, on average, of half a measurement until it is replaced.
 """
 
+from dataclasses import replace
 from math import tau
 
 import numpy as np
 
-from bench.analysis.signals import ACCELERATION, DISPLACEMENT, LASER_1, LASER_2
-from protocols.check.comparison import delay_between, laser_delay
+from bench.analysis.cycles import Cycle
 from protocols.check.protocol import CheckParameters
+from protocols.check.sines import delay_between, divided, laser_delays
 from protocols.common.calibrate import SETTLING
 from tests.benchmarks.coverage_sensors import ACCURACY, LEAD, RATE, REST, Motion, Sensors, cycles_of
 from tests.benchmarks.estimates import Estimate
@@ -39,22 +40,20 @@ def delays(seed: int) -> dict[str, Estimate]:
     """Delays [s] of accelerometer and laser 1 against the table's displacement, and of laser 2 against laser 1."""
     sensors, (motion, windows) = Sensors(seed), _motion()
     signals = sensors.signals(motion, None)[REST:]
-    amplitudes = list[np.ndarray]()
+    measured = list[tuple[float, list[Cycle]]]()
     for omega, window in zip(OMEGAS, windows, strict=True):
         # `cycles_of` leaves the first samples out
         cycles = cycles_of(np.concatenate((np.zeros((REST + LEAD, signals.shape[1])), signals[window])), omega)
-        measured = cycles[SETTLING : SETTLING + ASKED.cycles]
-        amplitudes.append(np.mean([each.fundamental for each in measured], axis=0))
-    columns = np.array(amplitudes).T
-    table = delay_between(OMEGAS, columns[DISPLACEMENT], columns[ACCELERATION])
-    first, second = (
-        laser_delay(OMEGAS, columns[DISPLACEMENT], columns[column], ACCURACY.laser_timing)
-        for column in (LASER_1, LASER_2)
-    )
+        shown = cycles[SETTLING : SETTLING + ASKED.cycles]
+        measured.append((float(omega), [replace(each, first=each.first + window.start) for each in shown]))
+    parts, windows = divided(measured, RATE)
+    sines = parts.means()
+    table = delay_between(OMEGAS, sines.displacement, -sines.acceleration)
+    lasers = laser_delays(parts, windows, "displacement", ACCURACY.laser_timing, RATE)
     laser = sensors.lasers[0]
     mean = (laser.latency + 0.5) / (laser.rate * (1.0 + laser.clock_error))
     return {
         "accelerometer": Estimate(table.delay, table.uncertainty, 0.0),
-        "laser_1": Estimate(first.delay, first.uncertainty, mean),
-        "lasers": Estimate(second.delay - first.delay, float(np.hypot(first.uncertainty, second.uncertainty)), 0.0),
+        "laser_1": Estimate(lasers.first.delay, lasers.first.uncertainty, mean),
+        "lasers": Estimate(lasers.difference, lasers.uncertainty, 0.0),
     }

@@ -1,6 +1,6 @@
 """The lines of the check from made-up signals whose truth is known."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -12,19 +12,11 @@ from bench.engine.steps import RestSamples
 from drivers.hardware.parameters import Hardware, Lasers
 from drivers.optoncdt.codec import IMPLAUSIBLE, LATE, LOST, MEANINGS
 from drivers.rig import Alignment, Channel
-from protocols.check.comparison import (
-    Sines,
-    allowed_delay,
-    delay_between,
-    delay_lines,
-    held_for,
-    laser_delay,
-    scale_lines,
-    signed_scale,
-    table_delay_lines,
-)
+from protocols.check.comparison import allowed_delay, delay_lines, scale_lines, signed_scale, table_delay_lines
+from protocols.check.held_readings import Windows
 from protocols.check.lines import alignment_lines, dead_time, drive_lines, input_lines, resting_lines
 from protocols.check.protocol import CheckParameters
+from protocols.check.sines import LaserDelays, Sines, delay_between, held_for, laser_delays
 from sim.specimen import Frame, Specimen
 
 OMEGA = np.array([8.0, 12.0, 18.0, 27.0, 40.0])
@@ -42,6 +34,18 @@ def sines(**changed: np.ndarray) -> Sines:
     x = (0.06 / OMEGA) * np.exp(0.7j)
     signals = {"drive": x, "acceleration": -(OMEGA**2) * x, "displacement": x, "storey_1": x, "storey_2": x}
     return Sines(omega=OMEGA, **(signals | changed))
+
+
+def laser_lines(made: Sines, configuration: BenchConfiguration) -> list[CheckLine]:
+    lasers = against(made, "displacement", held_for(configuration))
+    return list(delay_lines(made, lasers, PARAMETERS, configuration))
+
+
+def against(made: Sines, table: str, timing: float = 0.0) -> LaserDelays:
+    """Each sine in eight cycles, without noise and as if the ages of the readings were all the same."""
+    parts = Sines(**{each.name: np.repeat(getattr(made, each.name), 8) for each in fields(made)})
+    length = 2.0 * np.pi / parts.omega
+    return laser_delays(parts, Windows(np.cumsum(length) - length, length), table, timing, 2000.0)
 
 
 def failures(lines: list[CheckLine]) -> list[tuple[str, str]]:
@@ -97,26 +101,6 @@ def test_the_intervals_of_delays_and_scales_cover_95_percent() -> None:
     assert 0.93 < np.mean([abs(scale - 1.0) <= COVERAGE * u for scale, u in scales]) < 0.99
 
 
-@pytest.mark.parametrize("drift", [0.0, 0.02, 0.1, 0.2, 0.37])
-def test_the_interval_of_a_lasers_delay_covers_the_mean_age_of_its_readings(drift: float) -> None:
-    """The age of the held readings is uniform at first, and changes by `drift` of a period from one frequency to the
-    next. With clocks of equal rates it never scatters, and an interval from scatter alone would cover nothing; where
-    the ages are spread over a period, it would suffice.
-    """
-    period, latency, random = 2.5e-4, 1e-3, np.random.default_rng(9)
-    x, inside, alone = sines().displacement, 0, 0
-    for first in random.uniform(0.0, 1.0, 200):
-        ages = (first + drift * np.arange(OMEGA.size)) % 1.0
-        noise = 1.0 + 1e-5 * random.standard_normal(OMEGA.size)
-        laser = late(x, latency + period * ages) * noise
-        found = laser_delay(OMEGA, x, laser, period)
-        off = abs(found.delay - latency - 0.5 * period)
-        inside += off <= COVERAGE * found.uncertainty
-        alone += off <= COVERAGE * delay_between(OMEGA, x, laser).uncertainty
-    assert inside >= 190
-    assert alone < 20 or drift > 0.01
-
-
 def test_readings_of_serial_lasers_have_no_age() -> None:
     assert held_for(BenchConfiguration()) == BenchConfiguration().analysis.laser_timing
     assert held_for(SERIAL) == 0.0
@@ -130,7 +114,7 @@ def test_without_lasers_only_the_table_is_compared() -> None:
 
 def test_a_delay_is_measured_and_the_setting_takes_it_away() -> None:
     x = sines().displacement
-    lines = list(delay_lines(sines(storey_1=late(x, 0.003), storey_2=late(x, 0.0028)), PARAMETERS, SERIAL))
+    lines = laser_lines(sines(storey_1=late(x, 0.003), storey_2=late(x, 0.0028)), SERIAL)
     first, second, difference, setting = lines
     assert (first.measured, second.measured) == (pytest.approx(0.003, abs=1e-9), pytest.approx(0.0028, abs=1e-9))
     assert difference.measured == pytest.approx(-0.0002, abs=1e-9)
@@ -143,7 +127,7 @@ def test_a_delay_is_measured_and_the_setting_takes_it_away() -> None:
 @pytest.mark.parametrize("delay", [11e-6, 4.4e-4, -1.9e-4, 4.6e-4, -2.1e-4, 8e-3, 20e-3, -20e-3])
 def test_the_delay_between_the_sensors_of_the_table_is_measured(delay: float) -> None:
     made = sines(acceleration=late(sines().acceleration, delay))
-    line, *rest = table_delay_lines(made, PARAMETERS, 2000.0, lasers=False)
+    line, *rest = table_delay_lines(made, PARAMETERS, 2000.0)
     assert line.measured == pytest.approx(delay, abs=1e-9)
     assert (line.subject, line.what) == ("table_acceleration", "delay against table_displacement")
     assert line.verdict is (Verdict.PASSED if -2e-4 < delay < 4.5e-4 else Verdict.FAILED)
@@ -158,7 +142,7 @@ def test_the_sensor_that_differs_from_the_lasers_is_named(changed: str, odd: str
     # lasers with a latency of their own
     latency = {"storey_1": late(x, 6e-4), "storey_2": late(x, 6e-4)}
     made = sines(**latency, **{changed: late(getattr(sines(), changed), 8e-3)})
-    line, *pairs = table_delay_lines(made, PARAMETERS, 2000.0, lasers=True)
+    line, *pairs = table_delay_lines(made, PARAMETERS, 2000.0, lasers=against(made, "accelerometer"))
     assert f"{odd} differs from the lasers" in line.remedy
     assert "different times" in line.remedy
     assert [(pair.subject, pair.what) for pair in pairs] == [
@@ -178,15 +162,13 @@ def test_known_and_unknown_delays_of_inputs_are_told() -> None:
 
 
 def test_where_no_delay_can_be_set_none_is_stated() -> None:
-    lines = list(delay_lines(sines(), PARAMETERS, BenchConfiguration()))
+    lines = laser_lines(sines(), BenchConfiguration())
     assert [line.verdict for line in lines] == 3 * [Verdict.PASSED]
 
 
 def test_lasers_that_differ_in_delay_fail_on_their_difference() -> None:
     x = sines().displacement
-    lines = list(
-        delay_lines(sines(storey_1=late(x, -3.5e-4), storey_2=late(x, 3.5e-4)), PARAMETERS, BenchConfiguration())
-    )
+    lines = laser_lines(sines(storey_1=late(x, -3.5e-4), storey_2=late(x, 3.5e-4)), BenchConfiguration())
     assert failures(lines) == [("lasers", "delay of laser_2 against laser_1")]
 
 
@@ -208,7 +190,7 @@ def test_the_remedy_for_the_delay_of_a_laser_fits_its_cause(
 ) -> None:
     x = sines().displacement
     made = sines(storey_1=late(x, delays[0]), storey_2=late(x, delays[1]))
-    for line, remedy in zip(delay_lines(made, PARAMETERS, configuration), remedies, strict=False):
+    for line, remedy in zip(laser_lines(made, configuration), remedies, strict=False):
         assert remedy in line.remedy
         assert bool(remedy) is (line.verdict is Verdict.FAILED)
 
@@ -216,7 +198,7 @@ def test_the_remedy_for_the_delay_of_a_laser_fits_its_cause(
 @pytest.mark.parametrize("configuration", [SERIAL, ANALOGUE])
 def test_a_late_sensor_of_the_table_is_not_blamed_on_the_lasers(configuration: BenchConfiguration) -> None:
     """A table sensor behind a filter of 20 ms: a delay of the lasers set against it would make their values wrong."""
-    lines = list(delay_lines(sines(displacement=late(sines().displacement, 0.02)), PARAMETERS, configuration))
+    lines = laser_lines(sines(displacement=late(sines().displacement, 0.02)), configuration)
     assert failures(lines) == [(f"laser_{k}", "delay against table_displacement") for k in (1, 2)]
     for line in lines[:2]:
         assert "the table's sensors differ in delay" in line.remedy
