@@ -57,8 +57,12 @@ HARMONIC = {
 """Description and points of the cases of steady sines."""
 
 
-def _harmonic(seed: int, case: str, omega: float, beta: float) -> Outcome:
-    found = coverage.scored(seed, CASES[case], omega, beta)
+CAMPAIGN = ("default", "calibrated")
+"""Cases whose points are also tested within a campaign, with the bare frame at all of its frequencies."""
+
+
+def _harmonic(seed: int, case: str, omega: float, beta: float, *, campaign: bool = False) -> Outcome:
+    found = coverage.scored(seed, CASES[case], omega, beta, campaign=campaign)
     return found if isinstance(found, Omitted) else {"alpha_2": found.estimate}
 
 
@@ -119,6 +123,17 @@ def studies() -> dict[str, Study]:
         )
         for case, (text, points) in HARMONIC.items()
         for omega, beta in points
+    ]
+    found += [
+        Study(
+            f"alpha_2, {case}, campaign, {omega:g}, {beta:g}",
+            f"({omega:g}, {beta:.2f}), {HARMONIC[case][0]}, in a campaign",
+            alpha_2,
+            partial(_harmonic, case=case, omega=omega, beta=beta, campaign=True),
+            2.5 if case == "calibrated" else 1.2,
+        )
+        for case in CAMPAIGN
+        for omega, beta in (*coverage.POINTS, *MORE_POINTS)
     ]
     found += [
         Study(

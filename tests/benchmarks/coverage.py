@@ -28,7 +28,7 @@ from bench.analysis.linearity import LinearFrame
 from bench.analysis.sensor_accuracy import SensorUncertainty
 from bench.analysis.steady import Steadiness, SteadyDetector
 from bench.config.model import BenchConfiguration
-from protocols.common.sine.settling import INTERVAL, JUDGED, LASERS, SHORTEST, TRANSIENT, Settled
+from protocols.common.sine.settling import INTERVAL, JUDGED, LASERS, SHORTEST, TRANSIENT, Settled, checked
 from protocols.harmonic.judgement import Conditions, judge
 from protocols.harmonic.protocol import HarmonicParameters, HarmonicPoint, PointStatus
 from sim.gain import predict_gain
@@ -43,6 +43,7 @@ from tests.benchmarks.coverage_sensors import (
     RANGES,
     RATE,
     SOURCES,
+    Array,
     Case,
     Motion,
     Sensors,
@@ -86,10 +87,13 @@ class Bench:
     bare: Observed
     coupled: Observed
     calibration: LaserCalibration | None
+    others: Sequence[tuple[float, Observed]] = ()
 
 
-def bench(seed: int, case: Case, omega: float, beta: float) -> Bench | Omitted:
-    """Both tests of a bench; omitted where the true motion is not stable, or does not become steady."""
+def bench(seed: int, case: Case, omega: float, beta: float, *, campaign: bool = False) -> Bench | Omitted:
+    """Both tests of a bench, in a `campaign` also those of the bare frame at its other frequencies; omitted where the
+    true motion is not stable, or does not become steady.
+    """
     random, sensors = np.random.default_rng([seed, 3]), Sensors(seed, case)
     specimen = NOMINAL.coupled(beta)
     if "truth" not in case.off:
@@ -101,25 +105,37 @@ def bench(seed: int, case: Case, omega: float, beta: float) -> Bench | Omitted:
     found = calibration_of(seed, case) if case.calibrated else None
     phase, *start = (float(value) for value in branch.orbit.section)
     moved = np.array([*start[:4], 0.0, start[4]])
-    amplitudes = np.array(steady_response(specimen.bare(), true, LEVEL))
-    steady = [c.imag for c in (*amplitudes, *(1j * true * amplitudes))]
-    still = np.array([*steady, 0.0, 0.0])
-    sizes = np.array([*np.abs(amplitudes), *(true * np.abs(amplitudes)), 0.0, 0.0])
     if "transient" not in case.off:
         moved = moved * (1.0 + PERTURBED * random.standard_normal(6))
-        still = still + PERTURBED * sizes * random.standard_normal(6)
+    further = [one for one in ASKED.omega if one != omega] if campaign else []
     tests: list[Observed] = []
-    for state, start_phase, which in ((still, 0.0, specimen.bare()), (moved, phase, specimen)):
+    for at, state, start_phase, which in (
+        (omega, _bare_start(specimen, omega, case, random), 0.0, specimen.bare()),
+        (omega, moved, phase, specimen),
+        *((one, _bare_start(specimen, one, case, random), 0.0, specimen.bare()) for one in further),
+    ):
         try:
-            motion = approach(which, State.from_array(state), start_phase, omega, LEVEL, LONGEST, sensors)
+            motion = approach(which, State.from_array(state), start_phase, at, LEVEL, LONGEST, sensors)
         except RuntimeError:
             return Omitted("fell")
-        test = _observed(motion, cycles_of(sensors.signals(motion, found), omega), omega)
+        test = _observed(motion, cycles_of(sensors.signals(motion, found), at), at)
         if test is None:
             return Omitted("not steady")
         tests.append(test)
     scale = sensors.table * (found.table_acceleration if found else 1.0)
-    return Bench(omega, specimen, case.clock, scale, *tests, found)
+    others = [*zip(further, tests[2:], strict=True)]
+    return Bench(omega, specimen, case.clock, scale, tests[0], tests[1], found, others)
+
+
+def _bare_start(specimen: Specimen, omega: float, case: Case, random: np.random.Generator) -> Array:
+    """A state of the bare frame near its steady motion at phase 0."""
+    true = omega / (1.0 + case.clock)
+    amplitudes = np.array(steady_response(specimen.bare(), true, LEVEL))
+    steady = np.array([*(c.imag for c in (*amplitudes, *(1j * true * amplitudes))), 0.0, 0.0])
+    if "transient" in case.off:
+        return steady
+    sizes = np.array([*np.abs(amplitudes), *(true * np.abs(amplitudes)), 0.0, 0.0])
+    return steady + PERTURBED * sizes * random.standard_normal(6)
 
 
 @lru_cache(maxsize=256)
@@ -178,8 +194,9 @@ def _settled(test: Observed, omega: float, *, linear: bool) -> Settled:
 
 def score(each: Bench) -> Score:
     """Measure with the program, and compare with the truth."""
-    sensors = SensorUncertainty(ACCURACY, RANGES, each.calibration)
-    tests = [_settled(test, each.omega, linear=test is each.bare) for test in (each.bare, each.coupled)]
+    references = [_settled(test, omega, linear=True) for omega, test in ((each.omega, each.bare), *each.others)]
+    sensors = checked(SensorUncertainty(ACCURACY, RANGES, each.calibration), references)
+    tests = references[0], _settled(each.coupled, each.omega, linear=False)
     specimen = NOMINAL.coupled(each.specimen.label or 0.0)
     point = judge(tests[1], Conditions(each.omega, specimen, CONFIGURATION.known, tests[0], sensors), 1)
     assert point.alpha_2 is not None
@@ -194,9 +211,9 @@ def score(each: Bench) -> Score:
     )
 
 
-def scored(seed: int, case: Case, omega: float, beta: float) -> Score | Omitted:
+def scored(seed: int, case: Case, omega: float, beta: float, *, campaign: bool = False) -> Score | Omitted:
     """One bench, measured; omitted as well where the motion is on the other branch, which has another gain."""
-    found = bench(seed, case, omega, beta)
+    found = bench(seed, case, omega, beta, campaign=campaign)
     if isinstance(found, Omitted):
         return found
     one = score(found)
