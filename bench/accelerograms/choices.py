@@ -59,12 +59,21 @@ def refuse_choice(text: RecordText, choices: Choices, *names: str) -> None:
             raise InvalidInput(f"{name} of {text.path.name}", value, f"{remedies[name]}; omit it")
 
 
+def also_required(*, step: bool, unit: bool) -> str:
+    """What else must be given for a file that does not state its `step` or its `unit`, so that one attempt is enough;
+    empty if neither is missing.
+    """
+    missing = [option for option, absent in (("dt=SECONDS", step), ("unit=UNIT", unit)) if absent]
+    return f"; the file also requires {' and '.join(missing)}, after a comma each" if missing else ""
+
+
 def combine(text: RecordText, choices: Choices, reading: Reading) -> Accelerogram:
     """The accelerogram in m/s2. Raises InvalidInput if a choice contradicts the file, if neither states the step or the
     unit, or if the samples are fewer than two, not all finite or all zero.
     """
     name = text.path.name
-    dt = _step(name, choices.dt, reading.dt)
+    unstated = choices.unit is None and reading.unit is None
+    dt = _step(name, choices.dt, reading.dt, also_required(step=False, unit=unstated))
     unit = _unit(name, choices.unit, reading.unit)
     values = UNITS[unit] * reading.values
     if values.size < 2 or not np.isfinite(values).all():
@@ -83,7 +92,7 @@ def combine(text: RecordText, choices: Choices, reading: Reading) -> Accelerogra
     )
 
 
-def _step(name: str, given: float | None, stated: float | None) -> float:
+def _step(name: str, given: float | None, stated: float | None, also: str) -> float:
     if given is not None and not (isfinite(given) and given > 0.0):
         raise InvalidInput(f"dt of {name}", given, "it must be a positive number of seconds")
     if stated is not None and not (isfinite(stated) and stated > 0.0):
@@ -98,7 +107,8 @@ def _step(name: str, given: float | None, stated: float | None) -> float:
             "its time in ms, or an index? give the time in s",
         )
     if given is None and stated is None:
-        raise InvalidInput(f"dt of {name}", None, "the file does not state its time step; give it as @dt=SECONDS")
+        allowed = f"the file does not state its time step; give it as @dt=SECONDS{also}"
+        raise InvalidInput(f"dt of {name}", None, allowed)
     if given is not None and stated is not None and not isclose(given, stated, rel_tol=_SAME_STEP):
         raise InvalidInput(f"dt of {name}", given, f"the file states {stated:g} s; omit dt")
     # prefer the file's digits, if any

@@ -13,7 +13,7 @@ from math import isclose
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.accelerograms.choices import Choices, Reading, refuse_choice
+from bench.accelerograms.choices import Choices, Reading, also_required, refuse_choice
 from bench.accelerograms.numbers import NUMBER, place, value_of
 from bench.accelerograms.text import RecordText
 from bench.accelerograms.units import UNITS, spelled
@@ -192,12 +192,15 @@ def _column(text: RecordText, choices: Choices, table: _Table, time: bool) -> in
     """Index of the chosen column, from 0. Raises InvalidInput."""
     count = table.values.shape[1]
     names = [_heading(cell)[0] for cell in table.headings]
+    units = [_heading(cell)[1] for cell in table.headings[int(time) :]]
     offered = [f"{k + 1} ({names[k]})" if names else f"{k + 1}" for k in range(int(time), count)]
     item, wanted = f"column of {text.path.name}", choices.column
     if wanted is None:
         if len(offered) > 1:
+            unstated = choices.unit is None and not all(units or [None])
+            also = also_required(step=choices.dt is None and not time, unit=unstated)
             raise InvalidInput(
-                item, None, f"the file has several columns; select one with @column=NUMBER: {', '.join(offered)}"
+                item, None, f"the file has several columns; select one with @column=NUMBER: {', '.join(offered)}{also}"
             )
         return int(time)
     found = [k for k, name in enumerate(names) if name == wanted]

@@ -270,3 +270,26 @@ def test_files_that_are_no_records(refuse: Refuse, tmp_path: Path) -> None:
         read_accelerogram(tmp_path / "missing")
     with pytest.raises(InvalidInput, match="cannot be read"):
         read_accelerogram(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("lines", "given", "named"),
+    [
+        (["0.01 0.02", "0.03 -0.01", "0.02 0.01"], {}, ("@column=NUMBER: 1, 2", "requires dt=SECONDS and unit=UNIT")),
+        (["0.01 0.02", "0.03 -0.01", "0.02 0.01"], {"dt": 0.01}, ("@column=NUMBER", "requires unit=UNIT,")),
+        (["NS [g],EW [g]", "0.01,0.02", "0.03,-0.01"], {}, ("1 (NS), 2 (EW)", "requires dt=SECONDS,")),
+        (["0.01", "0.03", "0.02"], {}, ("@dt=SECONDS", "requires unit=UNIT,")),
+    ],
+)
+def test_everything_that_a_file_leaves_open_is_asked_for_at_once(
+    refuse: Refuse, lines: list[str], given: dict[str, object], named: tuple[str, ...]
+) -> None:
+    said = refuse(lines, **given)
+    for part in named:
+        assert part in said
+
+
+def test_what_a_file_states_is_not_asked_for(refuse: Refuse) -> None:
+    lines = ["t [s],NS [g],EW [g]", "0.00,0.01,0.02", "0.01,0.03,-0.01", "0.02,0.03,-0.01"]
+    assert "requires" not in refuse(lines)
+    assert "requires" not in refuse(["0.01", "0.03", "0.02"], unit="g")
