@@ -85,6 +85,13 @@ class ClockedSensor(Protocol):
         ...
 
 
+_FIRST_VALUE = 0.5
+"""Longest time from the start of a sensor to its first value [s], by which its observation is prolonged."""
+
+_ATTEMPTS = 5
+"""Waits for the rest of an observation, whose last values may arrive late."""
+
+
 @dataclass(frozen=True)
 class Track:
     """An instrument: its open sensor, its channel, and the placement of its values on the sample clock.
@@ -121,14 +128,14 @@ class Tracks:
 
     def begin(self, sample_rate: float, clock: Clock, pulses: Pulses | None = None) -> None:
         """Begin a run with a new sample clock; the history of the sensors' clocks and the rate of the previous sample
-        clock are kept. Before the first run, waits
-        until these clocks have been observed for the longest `observation_time`. `pulses` are those that have switched
-        the sensors' beams off since the last run, if any.
+        clock are kept. Before the first run, waits until these clocks have been observed for their `observation_time`.
+        `pulses` are those that have switched the sensors' beams off since the last run, if any.
         """
         clock.wait_until(self._known_from)
         for _ in range(2):
             # the second call raises the failure of a sensor, if there is one: the values before it are taken first
             self._take()
+        self._await_observation(clock)
         for track, raw in zip(self._tracks, self._raw, strict=True):
             if pulses is not None:
                 track.placing.observe_pulses(pulses.spacing)
@@ -137,6 +144,15 @@ class Tracks:
         self._armed = now()
         self._sample_rate = sample_rate
         self._clock = SampleClock(sample_rate, self._clock)
+
+    def _await_observation(self, clock: Clock) -> None:
+        """Wait for the rest of the observation, which begins with the first value of a sensor; not for a silent one."""
+        for _ in range(_ATTEMPTS):
+            missing = max((track.observation_time - track.placing.history for track in self._tracks), default=0.0)
+            if not 0.0 < missing <= _FIRST_VALUE:
+                return
+            clock.wait_until(now() + max(missing, _LEAST))
+            self._take()
 
     def observe(self, before: float, count: int, after: float) -> None:
         """Add a reading: `count` samples had been taken at some instant between two times of the machine's clock [s].

@@ -86,6 +86,11 @@ class SensorTrack:
         for part in np.split(np.arange(time.size), restarts):
             self._add(index[part], time[part], code[part], arrival[part])
 
+    @property
+    def history(self) -> float:
+        """Time for which the sensor's clock has been observed [s]."""
+        return self._sensor.history
+
     def reach(self, clock: SampleClock) -> float:
         """Time on the sample clock up to which values are available [s]; minus infinity if no value can be aligned."""
         line, last = self._line(clock), self._resampler.last

@@ -99,3 +99,19 @@ def test_a_block_that_is_itself_late_still_waits_for_what_a_stall_has_left_in_th
     assert longest_wait(1.5, 0.45) == pytest.approx(0.05)
     assert longest_wait(0.4, 0.35) == pytest.approx(0.025)
     assert longest_wait(0.1, 0.2) == 0.0
+
+
+@pytest.mark.parametrize(("first", "waited"), [(0.0, 0.0), (0.3, 0.3), (5.0, 0.0)])
+def test_a_sensor_is_observed_from_its_first_value_on(
+    monkeypatch: pytest.MonkeyPatch, first: float, waited: float
+) -> None:
+    """Measured from `first` [s] on; a sensor that is still silent at the end of the observation is not waited for."""
+    machine = Machine()
+    monkeypatch.setattr("drivers.hardware.tracks.now", machine.now)
+    sensor = Delayed(machine, (0.0, 0.0))
+    sensor._taken = round(first * MEASURED)
+    placing = SensorTrack("tilt", MEASURED, 0.006, lambda code: code.astype(np.int16), 32_000, MARKS)
+    tracks = Tracks([Track(sensor, Channel("tilt", "angle", "rad", 1e-4, 0.0, (-1, 1), "made"), placing, 1.0)])
+    tracks.begin(RATE, machine)
+    assert machine.time == pytest.approx(1.0 + waited, abs=0.06)
+    assert (placing.history >= 1.0) is (first < 1.0)
