@@ -92,7 +92,9 @@ def _folder() -> Path:
 
 
 def _own_name() -> str:
-    command = " ".join([Path(sys.argv[0]).name, *sys.argv[1:3]])
+    # "-c" or "-m" instead of a program's path
+    started = ["python", *sys.argv] if sys.argv[0].startswith("-") else [Path(sys.argv[0]).name, *sys.argv[1:]]
+    command = " ".join(started[:3])
     try:
         user = getpass.getuser()
     except (OSError, KeyError, ImportError):

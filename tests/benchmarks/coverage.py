@@ -108,7 +108,7 @@ def bench(seed: int, case: Case, omega: float, beta: float, *, campaign: bool = 
     if "transient" not in case.off:
         moved = moved * (1.0 + PERTURBED * random.standard_normal(6))
     further = [one for one in ASKED.omega if one != omega] if campaign else []
-    tests: list[Observed] = []
+    tests: list[tuple[float, Observed]] = []
     for at, state, start_phase, which in (
         (omega, _bare_start(specimen, omega, case, random), 0.0, specimen.bare()),
         (omega, moved, phase, specimen),
@@ -119,12 +119,13 @@ def bench(seed: int, case: Case, omega: float, beta: float, *, campaign: bool = 
         except RuntimeError:
             return Omitted("fell")
         test = _observed(motion, cycles_of(sensors.signals(motion, found), at), at)
-        if test is None:
+        if test is not None:
+            tests.append((at, test))
+        elif at == omega:
             return Omitted("not steady")
-        tests.append(test)
     scale = sensors.table * (found.table_acceleration if found else 1.0)
-    others = [*zip(further, tests[2:], strict=True)]
-    return Bench(omega, specimen, case.clock, scale, tests[0], tests[1], found, others)
+    (_, bare), (_, coupled), *others = tests
+    return Bench(omega, specimen, case.clock, scale, bare, coupled, found, others)
 
 
 def _bare_start(specimen: Specimen, omega: float, case: Case, random: np.random.Generator) -> Array:

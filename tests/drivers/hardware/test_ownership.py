@@ -39,7 +39,7 @@ def _holder(*devices: str) -> "subprocess.Popen[str]":
 
 def test_a_device_of_another_program_is_refused_with_its_name_until_it_is_killed() -> None:
     with _holder("Dev1", "COM5") as process:
-        with pytest.raises(DeviceNotFound, match=rf"com5 is in use by -c Dev1 COM5 \(process {process.pid}, "):
+        with pytest.raises(DeviceNotFound, match=rf"com5 is in use by python -c Dev1 \(process {process.pid}, "):
             owned(["com5"]).__enter__()
         process.kill()
         process.wait()
