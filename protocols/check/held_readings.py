@@ -27,8 +27,10 @@ clocks may also be as good as equal.
 """
 
 _FIRST_AGES = 48
-_RESOLVED = 0.05
-"""Age in the last cycle [T / q] between neighbouring differences of the clocks."""
+_RESOLVED, _MOST = 0.05, 4000
+"""Difference between the ages in the last cycle [T / q] for neighbouring differences of the clocks, and largest number
+of these on each side of 0, which bounds the time for short periods, whose ages hardly matter.
+"""
 
 _GRID = 0.02
 """Error of an age due to the steps of the grid [T / q], which is added to the scatter."""
@@ -117,7 +119,7 @@ def _ages(windows: Windows, timing: float, sample_rate: float, ways: int) -> Ite
     ratio = 1.0 / (timing * sample_rate)
     expected = (ratio - round(ratio * ways) / ways) * sample_rate
     most = CLOCKS / timing
-    steps = max(ceil(ways * most * windows.span / _RESOLVED), 1)
+    steps = min(max(ceil(ways * most * windows.span / _RESOLVED), 1), _MOST)
     differences = most * np.arange(-steps, steps + 1) / steps
     first = (np.arange(_FIRST_AGES) + 0.5) / _FIRST_AGES
     begin = windows.begin - windows.begin.min()

@@ -77,3 +77,14 @@ def test_the_noise_of_the_table_is_in_both_delays() -> None:
         scored.append((second.value - first.value) ** 2 / (whole - 2.0 * covariance(WINDOWS, first, second)))
         without.append((second.value - first.value) ** 2 / whole)
     assert 1.1 * np.sqrt(np.mean(without)) < np.sqrt(np.mean(scored)) < 1.2
+
+
+def test_short_periods_take_no_longer_and_change_nothing() -> None:
+    """With readings held for a microsecond, the delay and its uncertainty are those of a weighted mean."""
+    random = np.random.default_rng(7)
+    shown = measured(1e-6, 1e6 * (1.0 + 3e-5), 0.3, 1e-5, random)
+    found = delay_without_age(WINDOWS, shown, 1e-6, RATE)
+    mean = WINDOWS.weight @ shown
+    scatter = np.sqrt(WINDOWS.weight @ (shown - mean) ** 2 / (OMEGA.size - 3))
+    assert found.value == pytest.approx(mean, abs=1e-6)
+    assert found.uncertainty == pytest.approx(scatter, rel=0.1)
