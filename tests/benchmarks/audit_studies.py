@@ -113,27 +113,17 @@ CHECK = {
 def studies() -> dict[str, Study]:
     """All studies by name, in the order of the table."""
     alpha_2 = {"alpha_2": "α₂"}
+    alone = [(case, point, False) for case, (_, points) in HARMONIC.items() for point in points]
+    campaign = [(case, point, True) for case in CAMPAIGN for point in (*coverage.POINTS, *MORE_POINTS)]
     found = [
         Study(
-            f"alpha_2, {case}, {omega:g}, {beta:g}",
-            f"({omega:g}, {beta:.2f}), {text}",
+            f"alpha_2, {case}, {'campaign, ' if together else ''}{omega:g}, {beta:g}",
+            f"({omega:g}, {beta:.2f}), {HARMONIC[case][0]}{', in a campaign' if together else ''}",
             alpha_2,
-            partial(_harmonic, case=case, omega=omega, beta=beta),
-            1.6 if case == "calibrated" else 0.6,
+            partial(_harmonic, case=case, omega=omega, beta=beta, campaign=together),
+            (1.6 if case == "calibrated" else 0.6) + 0.8 * together,
         )
-        for case, (text, points) in HARMONIC.items()
-        for omega, beta in points
-    ]
-    found += [
-        Study(
-            f"alpha_2, {case}, campaign, {omega:g}, {beta:g}",
-            f"({omega:g}, {beta:.2f}), {HARMONIC[case][0]}, in a campaign",
-            alpha_2,
-            partial(_harmonic, case=case, omega=omega, beta=beta, campaign=True),
-            2.5 if case == "calibrated" else 1.2,
-        )
-        for case in CAMPAIGN
-        for omega, beta in (*coverage.POINTS, *MORE_POINTS)
+        for case, (omega, beta), together in (*alone, *campaign)
     ]
     found += [
         Study(
