@@ -287,6 +287,10 @@ def main(argv: Sequence[str] | None = None, progress: Progress = silent) -> int:
         report_interrupt(str(interrupt) or None)
         return 130
     except Exception as error:
+        if isinstance(error.__cause__, KeyboardInterrupt):
+            # compiled code, such as a lock of h5py, turns the interrupt into a SystemError
+            report_interrupt()
+            return 130
         # damaged contents may cause any exception
         if isinstance(error, OSError) or not reads_files(arguments):
             raise
