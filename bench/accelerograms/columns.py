@@ -192,13 +192,12 @@ def _column(text: RecordText, choices: Choices, table: _Table, time: bool) -> in
     """Index of the chosen column, from 0. Raises InvalidInput."""
     count = table.values.shape[1]
     names = [_heading(cell)[0] for cell in table.headings]
-    units = [_heading(cell)[1] for cell in table.headings[int(time) :]]
     offered = [f"{k + 1} ({names[k]})" if names else f"{k + 1}" for k in range(int(time), count)]
     item, wanted = f"column of {text.path.name}", choices.column
     if wanted is None:
         if len(offered) > 1:
-            unstated = choices.unit is None and not all(units or [None])
-            also = also_required(step=choices.dt is None and not time, unit=unstated)
+            stated = bool(names) and all(_heading(cell)[1] for cell in table.headings[int(time) :])
+            also = also_required(step=choices.dt is None and not time, unit=choices.unit is None and not stated)
             raise InvalidInput(
                 item, None, f"the file has several columns; select one with @column=NUMBER: {', '.join(offered)}{also}"
             )

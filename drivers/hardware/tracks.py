@@ -31,6 +31,11 @@ longest wait of a block that is already later [s], so that values received durin
 """
 
 
+_FIRST_VALUE = 0.5
+"""Longest time from the start of a sensor to its first value [s], by which its observation is prolonged."""
+_ATTEMPTS, _PAUSE = 5, 0.05
+"""Number of waits for the rest of an observation, whose last values may arrive late, and the shortest of them [s]."""
+
 _FASTEST = 5.0
 """Largest plausible speed of a target between two values [m/s]; a faster change is marked as implausible."""
 MARKS = Marks(LOST, LATE, IMPLAUSIBLE)
@@ -83,13 +88,6 @@ class ClockedSensor(Protocol):
     def close(self) -> None:
         """Release the device; may be called repeatedly, and never raises."""
         ...
-
-
-_FIRST_VALUE = 0.5
-"""Longest time from the start of a sensor to its first value [s], by which its observation is prolonged."""
-
-_ATTEMPTS = 5
-"""Waits for the rest of an observation, whose last values may arrive late."""
 
 
 @dataclass(frozen=True)
@@ -151,7 +149,7 @@ class Tracks:
             missing = max((track.observation_time - track.placing.history for track in self._tracks), default=0.0)
             if not 0.0 < missing <= _FIRST_VALUE:
                 return
-            clock.wait_until(now() + max(missing, _LEAST))
+            clock.wait_until(now() + max(missing, _PAUSE))
             self._take()
 
     def observe(self, before: float, count: int, after: float) -> None:

@@ -289,7 +289,7 @@ def main(argv: Sequence[str] | None = None, progress: Progress = silent) -> int:
     except Exception as error:
         if isinstance(error.__cause__, KeyboardInterrupt):
             # compiled code, such as a lock of h5py, turns the interrupt into a SystemError
-            report_interrupt()
+            report_interrupt(str(error.__cause__) or None)
             return 130
         # damaged contents may cause any exception
         if isinstance(error, OSError) or not reads_files(arguments):

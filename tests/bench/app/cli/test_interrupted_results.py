@@ -32,6 +32,21 @@ def interrupted_at_rename(monkeypatch: pytest.MonkeyPatch, *, after: bool) -> No
     monkeypatch.setattr(os, "replace", replace)
 
 
+def test_an_interrupt_inside_compiled_code_is_not_blamed_on_the_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A lock of h5py turns it into a SystemError."""
+
+    def opened(_: Path) -> None:
+        raise SystemError("returned a result with an exception set") from KeyboardInterrupt()
+
+    monkeypatch.setattr("bench.datafile.reader.open_datafile", opened)
+    file = tmp_path / "campaign.h5"
+    file.touch()
+    assert main(["export", str(file), "--to", "csv", "--out", str(tmp_path / "new")]) == 130
+    assert capsys.readouterr().err == "rockbench: error: interrupted\n"
+
+
 def test_a_complete_result_is_kept_and_named(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
