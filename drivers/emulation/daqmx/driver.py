@@ -186,7 +186,7 @@ class Driver:
         if whole:
             self._expired.add(parts[0].name)
             error = DAQmxErrors.CHASSIS_WATCHDOG_TIMER_EXPIRED
-        # the outputs first: when the relay is open, the drive is at zero
+        # the outputs first, which change at their next tick: one tick after the relay opened, the drive is at zero
         for output, value in volts.items():
             self.terminals[output].hold(value)
         for part in parts:

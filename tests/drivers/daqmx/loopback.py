@@ -63,6 +63,11 @@ class Loopback:
         now = self.tick() + 1
         return float(self._volts(now)[now - 1])
 
+    def next_output(self) -> float:
+        """Volts at the output at the next tick: what is set now takes effect there."""
+        time.sleep(max(self.time_of(self.tick() + 1) - time.monotonic(), 0.0))
+        return self.present_output()
+
     def played(self) -> NDArray[np.float64]:
         """Volts at the output at every tick until now."""
         now = self.tick() + 1

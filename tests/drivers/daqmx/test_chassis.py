@@ -75,8 +75,8 @@ def test_an_expiry_opens_the_relay_sets_the_output_to_zero_and_needs_a_new_sessi
             server.lose_network()
         # at once, or after its second: long before the time-out of the other case
         eventually(lambda: not plant.enabled)
-        # the output too, long before the samples that wait are played
-        assert plant.present_output() == 0.0
+        # the output too, at its next tick: after the samples that wait, it would hold their 3 V
+        assert plant.next_output() == 0.0
         assert session.cut() is True
         with pytest.raises(RigError):
             session.read(BLOCK)
