@@ -7,11 +7,12 @@ import json
 import re
 from collections.abc import Callable, Iterable
 from pathlib import Path
+from typing import Any
 
 import h5py
 import pytest
 
-from tests.first_edition.command import DATA, Rockbench, differences
+from tests.first_edition.command import DATA, ROUNDED, Rockbench, differences
 
 pytestmark = pytest.mark.usefixtures("shared_results")
 
@@ -41,7 +42,7 @@ def of(always: Iterable[str]) -> pytest.MarkDecorator:
     return pytest.mark.parametrize("file", cases, indirect=True)
 
 
-def recorded(file: Path) -> dict[str, object]:
+def recorded(file: Path) -> dict[str, Any]:
     """What the run printed when the file was written."""
     return json.loads((DATA / f"{file.stem}.json").read_text(encoding="utf-8"))
 
@@ -77,11 +78,17 @@ def test_it_is_replayed_bit_for_bit(file: Path, rockbench: Rockbench, same_arith
     assert (compared["drive samples"], compared["journal entries"], compared["points"]) == (samples, events, points)
     if same_arithmetic:
         # the drive and the journal to the last bit; predictions and the model are computed with fused operations today
-        parts = {each["text"].partition(" differ by at most ")[0] for each in found["differences"] if each["rounding"]}
-        assert len(parts) == len(found["differences"]), found["differences"]
-        assert parts <= {"points", "estimates", "running gains", "twin"}
-        assert found["agrees"]
-        assert done.code == 0, done.err
+        rounded = {
+            each["text"].partition(" differ by at most ")[0] for each in found["differences"] if each["rounding"]
+        }
+        assert rounded <= {"points", "estimates", "running gains", "twin"}
+        # the delays of lasers are estimated in another way today (`command.OF_DELAY`)
+        others = [each["text"].partition(" was ")[0] for each in found["differences"] if not each["rounding"]]
+        rows = enumerate(recorded(file)["points"], 1)
+        delays = [f"row {row} of points: measured" for row, line in rows if line.get("what", "").startswith("delay ")]
+        assert others == delays, found["differences"]
+        assert found["agrees"] is not bool(others)
+        assert done.code == bool(others), done.err
 
 
 @of(QUICK)
@@ -93,7 +100,7 @@ def test_it_is_analysed_again(file: Path, rockbench: Rockbench, same_arithmetic:
     assert found["recorded"] == recorded(file)["points"]
     assert len(found["points"]) == len(found["recorded"])
     if same_arithmetic:
-        assert not sorted(differences(found["recorded"], found["points"]))
+        assert not sorted(differences(found["recorded"], found["points"], rounded=ROUNDED))
     assert rockbench("file", "verify", again).code == 0
 
 

@@ -12,7 +12,7 @@ import h5py
 import pytest
 
 from tests.first_edition import inventory
-from tests.first_edition.command import DATA, EXCEPTED, Rockbench, differences
+from tests.first_edition.command import DATA, EXCEPTED, ROUNDED, Rockbench, differences
 
 pytestmark = pytest.mark.usefixtures("shared_results")
 
@@ -33,9 +33,10 @@ RENAMED = {"predicted for the asked motion": "predicted for the requested motion
 WITH_PASSES = {"earthquake"}
 """Runs whose protocol declares the table of the passes of a replication, which every file had."""
 
-ROUNDED = {"alpha_1_predicted": 1e-14, "alpha_2_predicted": 1e-14, "alpha_2_predicted_uncertainty": 1e-9}
-"""Largest relative difference of what the kernel computes with fused operations and members in lanes today: less than
-a millionth of the uncertainty."""
+ADDED = {"check": ("--delay-tolerance", "0.0005")}
+"""What a command needs today. The first edition did not compare the delays of the table's two sensors. With so few
+samples and an amplifier of 20 Hz, the steps of the drive shift the acceleration by 0.35 ms more than half a sample,
+which the default tolerance does not allow."""
 
 
 @dataclass(frozen=True)
@@ -76,7 +77,7 @@ def run(
     _table_of_today(folder)
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
-        done = rockbench(*COMMANDS[name])
+        done = rockbench(*COMMANDS[name], *ADDED.get(name, ()))
     assert done.code == 0, done.err
     yield Run(name, json.loads(done.out), folder / name)
     shutil.rmtree(folder)
@@ -135,4 +136,10 @@ def test_its_journal_has_the_same_events_in_the_same_order(run: Run, unpacked: C
     # the first edition did not warn, before anything else, of values outside their usual range
     while after[0][0] == "Warned" and " the usual " in after[0][1]:
         del after[0]
-    assert [RENAMED.get(kind, kind) for kind, _ in before] == [kind for kind, _ in after]
+    kinds = [RENAMED.get(kind, kind) for kind, _ in before]
+    more = len(json.loads((run.folder / "summary.json").read_text("utf-8"))["points"]) - kinds.count("PointFinished")
+    if run.name == "check":
+        # some of its lines were added after the first edition, all of them after the sines
+        last = len(kinds) - kinds[::-1].index("PointFinished")
+        kinds[last:last] = more * ["PointFinished"]
+    assert kinds == [kind for kind, _ in after]
