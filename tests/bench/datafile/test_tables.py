@@ -6,6 +6,7 @@ from typing import Any, TypeVar
 
 import h5py
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 from typing_extensions import TypeAliasType
 
@@ -27,6 +28,17 @@ def test_what_is_written_comes_back(tmp_path: Path) -> None:
         assert back[name].values.tolist() == column.values.tolist()
         assert back[name].values.dtype.kind == column.values.dtype.kind
         assert (back[name].unit or "1", back[name].description) == (column.unit or "1", column.description)
+
+
+def test_long_columns_of_text_are_written_in_parts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("bench.datafile.hdf5.MANY", 3)
+    plain, wide = ["rocking", "", "resting", "up", "rocking"], ["β", "Kobe", "L’Aquila", "", "Gölcük"]
+    with h5py.File(tmp_path / "made.h5", "w") as file:
+        table = {"plain": Column(np.array(plain), "", "ASCII"), "wide": Column(np.array(wide), "", "other characters")}
+        write(file, "motions", table)
+        assert [each.asstr()[:].tolist() for each in file["motions"].values()] == [plain, wide]
+        # as wide as the longest in UTF-8
+        assert [each.dtype.itemsize for each in file["motions"].values()] == [7, len("L’Aquila".encode())]
 
 
 def test_a_switch_that_is_absent_is_neither_true_nor_false(tmp_path: Path) -> None:
