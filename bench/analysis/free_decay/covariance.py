@@ -3,8 +3,9 @@
 The linearised fit converts an error of a measured signal into a shift of the fitted values (`Fit.moved`). The error is
 described differently for each source:
 
-- noise: from the spectrum of the residual (Welch), because neighbouring samples are correlated (laser resolution,
-filters); each quantity is affected only by the noise at the frequencies that determine it;
+- noise: from the spectra of the residual in sections of the decay (Welch), because neighbouring samples are correlated
+(laser resolution, filters), slow motions for longer; each quantity is affected only by the noise at the frequencies
+and times that determine it;
 - table: the noise of the table's sensor, filtered by the frame's response while a mode rings; the
 density of this noise is measured at rest before the motion;
 - clock: the lasers' clocks are not synchronised, so that a laser's delay wanders by up to one of its measuring periods;
@@ -78,8 +79,10 @@ OWN, COMMON = ("noise", "table", "clock"), ("linearity", "masses", "timebase")
 _RATES = np.array([2.0, 2.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0])
 """Exponents with which the sample rate enters the quantities of `response.NAMES`."""
 
-SEGMENT = 4.0
-"""Duration of the segments for the spectrum of the residual [s]."""
+SEGMENT, MOST_SECTIONS = 4.0, 4
+"""Duration of the segments for the spectrum of the residual [s], and largest number of sections of a decay, each with
+its own spectrum: the rounding errors of fast motions are white, those of slow motions are not.
+"""
 
 BAND = 30.0
 """Upper frequency of the band in which the noise of the table's sensor at rest is evaluated [Hz]."""
@@ -154,26 +157,39 @@ def _spread(moved: Array) -> Array:
 
 
 def _noise(fit: Fit) -> Array:
-    """Contribution of noise: the covariance of each laser's residual, from its spectrum, propagated through the
-    linearised fit.
+    """Contribution of noise: the covariance of each laser's residual, from its spectrum in sections of the decay,
+    propagated through the linearised fit.
     """
     from scipy import signal
 
     welch: Any = signal.welch
     n = fit.stretch.time.size
+    length = min(round(SEGMENT / fit.stretch.step), n)
+    twice = np.full(n // 2 + 1, 2.0)
+    twice[0] = 1.0
     scores = np.zeros_like(fit.inverse)
     for jacobian, residual in zip(fit.jacobian.transpose(1, 0, 2), fit.residual, strict=True):
-        length = min(round(SEGMENT / fit.stretch.step), n)
-        found = welch(residual, nperseg=length)
-        frequency, density = np.asarray(found[0], np.float64), np.asarray(found[1], np.float64)
-        turned = np.fft.rfft(jacobian)
-        # half the one-sided density is the variance of the equivalent white noise
-        left = _noise_passes(frequency, fit)
-        power = np.interp(np.fft.rfftfreq(n), frequency[left], density[left] / 2.0)
-        twice = np.full(power.size, 2.0)
-        twice[0] = 1.0
-        scores += ((turned * (twice * power / n)) @ turned.conj().T).real
+        for weight in _sections(n, length):
+            found = welch(residual[weight > 0.5], nperseg=length)
+            frequency, density = np.asarray(found[0], np.float64), np.asarray(found[1], np.float64)
+            left = _noise_passes(frequency, fit)
+            # half the one-sided density is the variance of the equivalent white noise
+            power = np.interp(np.fft.rfftfreq(n), frequency[left], density[left] / 2.0)
+            turned = np.fft.rfft(jacobian * weight)
+            scores += ((turned * (twice * power / n)) @ turned.conj().T).real
     return fit.inverse @ scores @ fit.inverse
+
+
+def _sections(n: int, length: int) -> Array:
+    """Weights of overlapping sections, shape (sections, n), whose squares sum to 1. Their middles are at least two
+    segments of `length` samples apart; a shorter signal is one section.
+    """
+    number = min(1 + n // (2 * length), MOST_SECTIONS)
+    if number == 1:
+        return np.ones((1, n))
+    middles = np.linspace(0.0, n - 1.0, number)[:, None]
+    apart = np.abs(np.arange(n) - middles) / middles[1]
+    return np.sqrt(np.maximum(1.0 - apart, 0.0))
 
 
 def _noise_passes(frequency: Array, fit: Fit) -> NDArray[np.bool_]:

@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 from bench.analysis.free_decay.covariance import Errors, fit_uncertainty
 from bench.analysis.free_decay.decay import Setting, combine, pulsed_decay, released_decay
 from bench.analysis.free_decay.fit import fit_from_scratch
-from bench.analysis.free_decay.response import K1, K2, OMEGA1, XI1, XI2, Constants, quantities, response
+from bench.analysis.free_decay.response import K1, K2, OMEGA1, XI1, XI2, Constants, quantities, response, slopes
 from bench.analysis.free_decay.stretch import Unusable, stretch_of
 from bench.analysis.sensor_accuracy import SensorAccuracy, SensorUncertainty
 from sim.specimen import Frame
@@ -130,6 +130,30 @@ def test_the_stated_uncertainty_is_the_scatter_of_many_recordings() -> None:
     share = np.sqrt(np.mean(np.square(errors), axis=0) / np.mean(np.square(stated), axis=0))
     # root of chi2 over 20 degrees of freedom, between its 0.1 % and 99.9 %
     assert np.all((share > 0.54) & (share < 1.51)), share
+
+
+@pytest.mark.parametrize("loud_first", [True, False])
+def test_noise_counts_when_it_matters(loud_first: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("bench.analysis.free_decay.covariance.SEGMENT", 1.0)
+    stretch = released_decay(released(constants()), setting()).fit.stretch
+    fit, random = fit_from_scratch(stretch, setting().masses), np.random.default_rng(8)
+    level = np.geomspace(1e-5, 1e-6, stretch.time.size)[:: 1 if loud_first else -1]
+    noise = level * random.standard_normal((400, 2, stretch.time.size))
+    moved = fit.moved(noise)
+    turn, _ = slopes(fit.constants)
+    actual = (moved[:, : turn.shape[1]] @ turn.T).std(axis=0)
+
+    def stated() -> Array:
+        errors = Errors(sensors(SensorAccuracy()), 0.0, np.zeros((2, 2)))
+        left = [one - np.tensordot(shift, fit.jacobian, 1) for one, shift in zip(noise[:20], moved[:20], strict=True)]
+        parts = [fit_uncertainty(replace(fit, residual=each), errors).parts["noise"] for each in left]
+        return np.sqrt(np.mean([np.diag(part) for part in parts], axis=0))
+
+    # mode 2 decays sooner: the noise of the beginning determines its damping
+    assert stated()[[XI1, XI2]] / actual[[XI1, XI2]] == pytest.approx([1.0, 1.0], rel=0.2)
+    monkeypatch.setattr("bench.analysis.free_decay.covariance.MOST_SECTIONS", 1)
+    alike = float(stated()[XI2] / actual[XI2])
+    assert alike < 0.8 if loud_first else alike > 1.6, alike
 
 
 def test_weighing_errors_move_the_stiffness_as_stated() -> None:
