@@ -6,9 +6,8 @@ since the next block continues from the last rows of the previous one.
 """
 
 from collections.abc import Generator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import ceil
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +15,7 @@ from numpy.typing import NDArray
 from sim.return_map import MOST_KNOWN, Solution, Solutions, extrapolated, follow, newton, parameters
 from sim.specimen import Specimen
 from sim.steady import NoOrbit, branch_solutions
-from sim.sweep import Done, connection, sweep_in_stages
+from sim.sweep import Done, connection, sweep
 
 Floats = NDArray[np.float64]
 
@@ -66,64 +65,45 @@ def rows_of_orbits(
     """Orbits of each of the `specimens`, in blocks of rows, with the state from which the next block continues.
 
     The first block continues from the state `after`, if there is one. `scheduler` and `done` are those of
-    `sim.sweep.sweep_in_stages`; `done` counts the strips of each block.
+    `sim.sweep.sweep`; `done` counts the strips of each block.
     """
     with connection(scheduler):
         parts = np.array_split(np.arange(omegas.size), min(omegas.size, max(STRIPS, ceil(omegas.size / WIDE))))
         if after is None:
             first = _first_row(specimens[0], omegas, amplitude)
-            after, own = Continuation(0, first.section[None], first.jacobian[None]), first.peaks[None]
+            after, size = Continuation(0, first.section[None], first.jacobian[None]), 1
+            peaks = first.peaks[None]
         else:
-            own = np.empty((0, omegas.size, 3))
-        if after.rows == len(specimens):
-            return
-        size = rows_at_once(omegas.size)
-        ends = [*range(after.rows + size, len(specimens), size), len(specimens)]
-        # the first row is itself part of the first block
-        known = after.rows + len(own) - len(after.sections)
-        strips = [
-            _Strip(
-                0,
-                specimens[known : ends[0]],
-                omegas[part],
-                amplitude,
-                after.sections[:, part],
-                after.jacobians[:, part],
-                own[:, part],
-            )
-            for part in parts
-        ]
-
-        def following(strip: _Strip, found: _Found) -> _Strip | None:
-            block = strip.block + 1
-            if block == len(ends):
-                return None
-            rows = specimens[ends[block - 1] - len(found.last_sections) : ends[block]]
-            return replace(
-                strip,
-                block=block,
-                specimens=rows,
-                sections=found.last_sections,
-                jacobians=found.last_jacobians,
-                peaks=strip.peaks[:0],
-            )
-
-        blocks = sweep_in_stages(_follow_strip, strips, following, scheduler, done=done)
-        for end, strips_found in zip(ends, blocks, strict=True):
-            rows, peaks, multipliers, sections, jacobians = (
-                np.concatenate(each, axis=1) for each in zip(*strips_found, strict=True)
-            )
-            yield Rows(rows, peaks, multipliers), Continuation(end, sections, jacobians)
+            size, peaks = 0, np.empty((0, omegas.size, 3))
+        while after.rows < len(specimens):
+            end = min(after.rows + rows_at_once(omegas.size), len(specimens))
+            # the first row is itself part of the first block
+            begin = after.rows + size - len(after.sections)
+            strips = [
+                _Strip(
+                    specimens[begin:end],
+                    omegas[part],
+                    amplitude,
+                    after.sections[:, part],
+                    after.jacobians[:, part],
+                    peaks[:, part],
+                )
+                for part in parts
+            ]
+            followed = sweep(_follow_strip, strips, scheduler, done=done)
+            found = [np.concatenate(each, axis=1) for each in zip(*followed, strict=True)]
+            after = Continuation(end, found[3], found[4])
+            size, peaks = 0, peaks[:0]
+            yield Rows(found[0], found[1], found[2]), after
 
 
 @dataclass(frozen=True, eq=False)
 class _Strip:
     """Columns that are continued together, from known rows of the first specimens: `sections`, shape (k, m, 6), and
-    `jacobians`, shape (k, m, 6, 6). The last j of these rows are part of the block of rows to be computed, with the
-    number `block`; `peaks`, shape (j, m, 3), are the peaks of these j rows.
+    `jacobians`, shape (k, m, 6, 6). The last j of these rows are part of the block of rows to be computed; `peaks`,
+    shape (j, m, 3), are the peaks of these j rows.
     """
 
-    block: int
     specimens: list[Specimen]
     omegas: Floats
     amplitude: float
@@ -132,20 +112,10 @@ class _Strip:
     peaks: Floats
 
 
-class _Found(NamedTuple):
+def _follow_strip(strip: _Strip) -> tuple[Floats, Floats, NDArray[np.complex128], Floats, Floats]:
     """Sections, shape (n, m, 6), peaks, (n, m, 3), and multipliers, (n, m, 6), of n rows and m columns; then sections
     and Jacobians of the last rows.
     """
-
-    sections: Floats
-    peaks: Floats
-    multipliers: NDArray[np.complex128]
-    last_sections: Floats
-    last_jacobians: Floats
-
-
-def _follow_strip(strip: _Strip) -> _Found:
-    """The rows of a strip."""
     known, own = len(strip.sections), len(strip.peaks)
     # peaks of rows before this block of rows are not needed
     peaks: Floats = np.full((known, *strip.sections.shape[1:2], 3), np.nan)
@@ -174,7 +144,7 @@ def _follow_strip(strip: _Strip) -> _Found:
         rows.append(row)
         multipliers.append(_multipliers(row))
     block, last = rows[known - own :], rows[-MOST_KNOWN:]
-    return _Found(
+    return (
         np.stack([row.section for row in block]),
         np.stack([row.peaks for row in block]),
         np.stack(multipliers),

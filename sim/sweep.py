@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Callable, Generator, Iterable
-from concurrent.futures import FIRST_COMPLETED, FIRST_EXCEPTION, Future, ThreadPoolExecutor
+from concurrent.futures import FIRST_EXCEPTION, Future, ThreadPoolExecutor
 from concurrent.futures import wait as wait_for
 from contextlib import contextmanager
 from importlib import import_module
@@ -89,51 +89,6 @@ def in_threads(
             if done is not None:
                 done(len(futures) - len(waiting), len(futures))
         return [future.result() for future in futures]
-    finally:
-        pool.shutdown(wait=False, cancel_futures=True)
-
-
-def sweep_in_stages(
-    function: Callable[[Item], Result],
-    items: Iterable[Item],
-    following: Callable[[Item, Result], Item | None],
-    scheduler: str | None = None,
-    *,
-    done: Done | None = None,
-) -> Generator[list[Result], None, None]:
-    """Apply `function` to each item of a first stage, then to `following(item, result)` of each of its items, and so on
-    until these are None; return the results of one stage after another, in the order of its items.
-
-    In threads, an item of the next stage is started as soon as the one that it follows is completed, so that the
-    processors are not idle at the end of a stage or while its results are used; at most one stage is computed ahead.
-    With a dask `scheduler`, one stage is computed at a time. `done` counts the items of each stage. Raises the errors
-    of `sweep`.
-    """
-    stage = list(items)
-    if scheduler is not None:
-        while stage:
-            results = sweep(function, stage, scheduler, done=done)
-            stage = [item for item in map(following, stage, results) if item is not None]
-            yield results
-        return
-    pool = ThreadPoolExecutor(processors())
-    try:
-        futures = [pool.submit(function, item) for item in stage]
-        while futures:
-            ahead: dict[int, tuple[Item, Future[Result]]] = {}
-            waiting = {future: place for place, future in enumerate(futures)}
-            while waiting:
-                finished, _ = wait_for(waiting, STEP, FIRST_COMPLETED)
-                for future in finished:
-                    place = waiting.pop(future)
-                    item = following(stage[place], future.result())
-                    if item is not None:
-                        ahead[place] = item, pool.submit(function, item)
-                if done is not None:
-                    done(len(futures) - len(waiting), len(futures))
-            yield [future.result() for future in futures]
-            ordered = [ahead[place] for place in sorted(ahead)]
-            stage, futures = [item for item, _ in ordered], [future for _, future in ordered]
     finally:
         pool.shutdown(wait=False, cancel_futures=True)
 

@@ -5,7 +5,6 @@ import socket
 import sys
 import threading
 import warnings
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -22,7 +21,7 @@ from sim.maps import gain_map
 from sim.outcomes import outcome_map
 from sim.specimen import Specimen
 from sim.steady import rocking_orbit
-from sim.sweep import SchedulerUnavailable, connection, in_threads, processors, sweep, sweep_in_stages
+from sim.sweep import SchedulerUnavailable, connection, in_threads, processors, sweep
 from tests.patience import LONG
 from tests.sim.runs import A_S
 
@@ -46,42 +45,6 @@ def test_threads_keep_the_order_and_share_the_work() -> None:
 
     assert sweep(both, range(50)) == [value * value for value in range(50)]
     assert sweep(both, []) == []
-
-
-def test_stages_follow_each_other() -> None:
-    counts = list[tuple[int, int]]()
-
-    def following(item: int, result: int) -> int | None:
-        assert result == 10 * item
-        return item + 3 if item < 7 else None
-
-    found = sweep_in_stages(lambda item: 10 * item, [1, 2, 3], following, done=lambda *count: counts.append(count))
-    assert list(found) == [[10, 20, 30], [40, 50, 60], [70, 80, 90]]
-    assert [count for count in counts if count[0] == 3] == [(3, 3)] * 3
-    assert list(sweep_in_stages(inverse, [], lambda item, _: item)) == []
-
-
-def test_an_item_starts_when_the_one_that_it_follows_is_there(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("os.cpu_count", lambda: 2)
-    ahead = threading.Event()
-
-    def slow(item: tuple[int, int]) -> bool:
-        if item == (1, 0):
-            ahead.set()
-        # the first stage is not completed before the second has begun
-        return item != (0, 1) or ahead.wait(LONG)
-
-    def following(item: tuple[int, int], _: bool) -> tuple[int, int] | None:
-        return (item[0] + 1, item[1]) if item[0] < 1 else None
-
-    assert list(sweep_in_stages(slow, [(0, 0), (0, 1)], following)) == [[True, True]] * 2
-
-
-def test_an_error_in_a_stage_comes_through() -> None:
-    stages = sweep_in_stages(inverse, [1, 2], lambda item, _: item - 1 if item else None)
-    assert next(stages) == [1.0, 0.5]
-    with pytest.raises(ZeroDivisionError):
-        next(stages)
 
 
 def test_errors_come_through() -> None:
@@ -125,8 +88,6 @@ def test_a_scheduler_s_workers_do_the_work(cluster: Any) -> None:
     assert len(set(seen)) == 2
     assert os.getpid() not in seen
     assert sweep(inverse, range(1, 8), address, batch=3) == [1.0 / value for value in range(1, 8)]
-    stages = sweep_in_stages(inverse, [4, 8], lambda item, _: item // 2 if item > 2 else None, address)
-    assert list(stages) == [[0.25, 0.125], [0.5, 0.25], [0.5]]
     with pytest.raises(ZeroDivisionError):
         sweep(inverse, [1, 0], address)
 
@@ -135,11 +96,11 @@ def test_a_map_is_divided_alike_on_all_computers(cluster: Any, monkeypatch: pyte
     """So that its orbits do not depend on them; there are strips for both workers, and more of a wide map."""
     strips: list[int] = []
 
-    def counted(function: Any, items: Any, following: Any, scheduler: str | None, *, done: Any) -> Iterator[list[Any]]:
+    def counted(function: Any, items: Any, scheduler: str | None, *, done: Any) -> list[Any]:
         strips.append(len(items))
-        return sweep_in_stages(function, items, following, scheduler, done=done)
+        return sweep(function, items, scheduler, done=done)
 
-    monkeypatch.setattr("sim.map_rows.sweep_in_stages", counted)
+    monkeypatch.setattr("sim.map_rows.sweep", counted)
     address, omegas = str(cluster.scheduler_address), np.linspace(14.0, 20.0, 12)
     assert processors(address) == 2
     found = [gain_map(Specimen(), [0.2, 0.6], omegas, A_S, scheduler=address)]
