@@ -1,6 +1,7 @@
 """Agreement with other people's integrators and other routes, to the last digits that the problem has."""
 
 import json
+from decimal import Decimal
 from math import cos, fsum, hypot, sin
 
 import numpy as np
@@ -64,9 +65,13 @@ def test_stored_references_are_what_their_integrators_compute(name: str) -> None
         pytest.importorskip("heyoka", reason="heyoka is not installed: uv sync --all-groups")
     stored, computed = json.loads(FILE.read_text(encoding="utf-8"))[name], CASES[name]()
     assert stored["impacts"] == computed["impacts"]
-    # digits of mpmath; heyoka's rounding over two minutes depends on the processor
+    # the last bits of the frame's dashpots, from an eigenvalue problem, depend on the processor, and heyoka's rounding
+    # over two minutes does too
     if "uplifts" in stored:
-        assert stored["end"] == computed["end"]
+        differences = [
+            abs(Decimal(one) - Decimal(other)) for one, other in zip(stored["end"], computed["end"], strict=True)
+        ]
+        assert max(differences) < Decimal("1e-17")
     else:
         assert stored["end"] == pytest.approx(computed["end"], rel=0.0, abs=5e-13)
 
