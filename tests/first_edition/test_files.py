@@ -87,6 +87,7 @@ def test_it_is_replayed_bit_for_bit(file: Path, rockbench: Rockbench, same_arith
         rows = enumerate(recorded(file)["points"], 1)
         delays = [f"row {row} of points: measured" for row, line in rows if line.get("what", "").startswith("delay ")]
         assert others == delays, found["differences"]
+        assert len(rounded) + len(others) == len(found["differences"]), found["differences"]
         assert found["agrees"] is not bool(others)
         assert done.code == bool(others), done.err
 

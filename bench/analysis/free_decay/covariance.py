@@ -167,9 +167,11 @@ def _noise(fit: Fit) -> Array:
     length = min(round(SEGMENT / fit.stretch.step), n)
     twice = np.full(n // 2 + 1, 2.0)
     twice[0] = 1.0
+    sections = _sections(n, length)
     scores = np.zeros_like(fit.inverse)
     for jacobian, residual in zip(fit.jacobian.transpose(1, 0, 2), fit.residual, strict=True):
-        for weight in _sections(n, length):
+        for weight in sections:
+            # the spectrum of the samples around the middle, where a section counts most
             found = welch(residual[weight > 0.5], nperseg=length)
             frequency, density = np.asarray(found[0], np.float64), np.asarray(found[1], np.float64)
             left = _noise_passes(frequency, fit)
