@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from bench.analysis.cycles import Cycle, Waves, mean_amplitude, mean_waves
 from bench.analysis.linearity import Checks, Harmonics, LinearFrame
 from bench.analysis.remaining_transient import remaining_transient
+from bench.analysis.rounding import FittedPeak
 from bench.analysis.sensor_accuracy import Draws, PeakReadings, SensorUncertainty, Shapes
 from bench.analysis.sensor_accuracy import SensorAccuracy as SensorAccuracy
 from bench.analysis.signals import ACCELERATION, DRIFT, LASER_1, LASER_2, U1
@@ -38,15 +39,6 @@ table.
 PEAK_HARMONICS = 5
 """Highest harmonic used for the peak of a steady drift. An impact acts on the second storey through two springs and two
 masses, so higher harmonics change the peak by less than 1e-4.
-"""
-
-PEAK_ROUNDINGS = 0.6 * (((PEAK_HARMONICS + 1) // 2) ** 2 + (PEAK_HARMONICS // 2) ** 2)
-"""Mean square error of a steady peak due to a laser's resolution, relative to that of the averaged rounding errors of a
-cycle. A sine of amplitude A, rounded to steps q, has in harmonic k the errors 2 q / (pi m) J_k(z), z = 2 pi m A / q, m
-= 1, 2, ..., times the sine (k odd) or cosine (k even) of the position of the steps. Since the mean of J_k^2 is 1 / (pi
-z), the sum of their mean squares is zeta(3) q^3 / (pi^4 A). The mean of the rounding errors of 4 A / q steps, each with
-the variance q^2 / 12, would have the variance q^3 / (48 A). At the turning point the errors of all odd harmonics have
-the same sign, as do those of all even ones, so they add up.
 """
 
 
@@ -120,14 +112,14 @@ def steady_peak(
         u1=float(waves.peaks[U1]),
         amplitude=mean_amplitude(cycles, ACCELERATION),
         harmonics=float(waves.harmonics[ACCELERATION]),
-        readings=_readings(waves, omega, drift),
+        readings=_readings(cycles, waves, omega, drift),
         cycles=len(cycles),
         checks=None if frame is None else _checks(cycles, waves, omega, frame),
         freedom=freedom,
     )
 
 
-def _readings(waves: Waves, omega: float, drift: float) -> PeakReadings:
+def _readings(cycles: Sequence[Cycle], waves: Waves, omega: float, drift: float) -> PeakReadings:
     """Lasers' readings at the peak of the mean cycle."""
     lasers = waves.waveform[:, [LASER_1, LASER_2]].T
     peak = waves.at[DRIFT]
@@ -138,6 +130,12 @@ def _readings(waves: Waves, omega: float, drift: float) -> PeakReadings:
     places: NDArray[np.float64] = np.arange(0.0, lasers.shape[1], step)
     angles = (places - peak) * (tau / lasers.shape[1])
     orders = np.arange(1, PEAK_HARMONICS + 1)
+    harmonics = np.array(
+        [
+            [np.append(each.coefficients[0, column], -1j * each.harmonics(column)) for each in cycles]
+            for column in (LASER_1, LASER_2)
+        ]
+    )
     return PeakReadings(
         drift=drift,
         sign=float(np.sign(waves.waveform[peak, DRIFT])),
@@ -145,9 +143,9 @@ def _readings(waves: Waves, omega: float, drift: float) -> PeakReadings:
         speeds=(float(speeds[0]), float(speeds[1])),
         zero=lasers[:, ::step],
         swings=(float(swings[0]), float(swings[1])),
-        terms=PEAK_ROUNDINGS,
         at_rest=False,
         weights=(2.0 / angles.size) * np.cos(np.outer(angles, orders)).sum(axis=1),
+        fitted=FittedPeak(harmonics, float(peak) * tau / lasers.shape[1], PEAK_HARMONICS),
     )
 
 

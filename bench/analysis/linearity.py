@@ -83,9 +83,9 @@ class Harmonics:
         """The harmonics with the additional uncertainty due to the `step` [m] of the readings, at most that of one
         rounding. Returns the same object for the same step.
 
-        The scatter of the cycles does not contain this uncertainty, since all cycles are rounded alike. As derived for
-        `bench.analysis.gain.PEAK_ROUNDINGS`, the mean square of the amplitude of one harmonic is zeta(3) q^3 /
-        (pi^4 A), half of it in each part.
+        The scatter of the cycles does not contain this uncertainty, since all cycles are rounded alike. By the sum in
+        `bench.analysis.rounding`, the mean square of the amplitude of one harmonic is zeta(3) q^3 / (pi^4 A) for a sine
+        of amplitude A, half of it in each part.
         """
         swing = max(0.5 * self.swing, step, np.finfo(np.float64).tiny)
         rounding = min(sqrt(0.5 * ZETA_3 * step**3 / (pi**4 * swing)), step / sqrt(12.0))

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from bench.analysis.laser_calibration import LaserCalibration
 from bench.analysis.linearity import SMOOTH, Checks, Effect, LinearityErrors, linearity_errors, widest
+from bench.analysis.rounding import FittedPeak
 from sim.parameters import Parameters, quantity
 
 Array = NDArray[np.float64]
@@ -65,10 +66,10 @@ class PeakReadings:
     lasers, speeds : reading of each laser [m] and its rate [m/s].
     zero : readings [m], shape (2, n), whose mean is the zero of the peak; zeros, shape (2, 1), if it was taken at rest.
     swings : span of each laser's readings [m] in the fit of the peak.
-    terms : mean square rounding error of the peak, relative to that of a mean over the readings of the cycle.
     at_rest : whether the zero was taken at rest, where rounding errors do not average out.
     weights : derivatives of the peak of a fitted cycle with respect to the readings in `zero`, shape (n,); None if the
         peak is the reading at the peak minus the mean of `zero`.
+    fitted : the fitted cycles of which it is the peak; None for a fit to the readings around a single peak.
     """
 
     drift: float
@@ -77,9 +78,9 @@ class PeakReadings:
     speeds: tuple[float, float]
     zero: Array
     swings: tuple[float, float]
-    terms: float
     at_rest: bool
     weights: Array | None = None
+    fitted: FittedPeak | None = None
 
     def effect(self, laser: int) -> Effect:
         """Effect of the error of laser 0 or 1 on the peak."""
@@ -257,15 +258,18 @@ class SensorUncertainty:
         return seen.speeds[laser] * self.accuracy.laser_timing * draws.uniform(-0.5, 0.5)
 
     def steps(self, seen: PeakReadings, laser: int, draws: "Draws") -> Array:
-        """Errors [m] due to a laser's resolution, shape (n,): the averaged rounding errors of the fit, and one rounding
-        error if the zero was taken at rest.
+        """Errors [m] due to a laser's resolution, shape (n,): the rounding errors of the fit, and one rounding error if
+        the zero was taken at rest. A fit around a single peak averages those of the steps that the laser passes.
         """
         step = self.accuracy.laser_resolution
         if step == 0.0:
             return np.zeros(draws.n)
-        variance = seen.terms / (12.0 * (1.0 + 2.0 * seen.swings[laser] / step))
-        zero = draws.uniform(-0.5, 0.5) if seen.at_rest else 0.0
-        return step * (np.sqrt(variance) * draws.normal() + zero)
+        if seen.fitted is not None:
+            variance = seen.fitted.variances(step)[laser]
+        else:
+            variance = step**2 / (12.0 * (1.0 + 2.0 * seen.swings[laser] / step))
+        zero = step * draws.uniform(-0.5, 0.5) if seen.at_rest else 0.0
+        return sqrt(variance) * draws.normal() + zero
 
 
 def _shares(seen: Sequence[PeakReadings]) -> Array:

@@ -149,6 +149,5 @@ def _readings(drift: float, seen: Array, omega: float) -> PeakReadings:
         zero=np.zeros((2, 1)),
         # one rounding error, averaged over the steps that a laser passes around the peak
         swings=(range_1, range_2),
-        terms=1.0,
         at_rest=True,
     )

@@ -254,6 +254,5 @@ def _sighting(seen: PeakSeen) -> PeakReadings:
         speeds=seen.speeds,
         zero=np.zeros((2, 1)),
         swings=seen.swings,
-        terms=1.0,
         at_rest=True,
     )

@@ -31,7 +31,7 @@ def peak(drift: float, lag: float = 0.0) -> SteadyPeak:
         0.001,
         1.2,
         0.0,
-        PeakReadings(drift, 1.0, lasers, (0, 0), zero, swings, 6.0, False, weights),
+        PeakReadings(drift, 1.0, lasers, (0, 0), zero, swings, False, weights),
         24,
     )
 

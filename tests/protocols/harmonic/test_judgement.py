@@ -30,9 +30,7 @@ STEADY = Steadiness(True, 0.0, 0.0, 1)
 
 
 def _settled(drift: float, u1: float, steadiness: Steadiness = STEADY) -> Settled:
-    seen = PeakReadings(
-        drift, 1.0, (-0.8 * drift, 0.2 * drift), (0.0, 0.0), np.zeros((2, 1)), (drift, drift), 6.0, False
-    )
+    seen = PeakReadings(drift, 1.0, (-0.8 * drift, 0.2 * drift), (0.0, 0.0), np.zeros((2, 1)), (drift, drift), False)
     return Settled(SteadyPeak(drift, 0.0, 0.0, u1, AMPLITUDE, 0.002, seen, 24), steadiness, 60.0, 0.0, 0.0, 3)
 
 

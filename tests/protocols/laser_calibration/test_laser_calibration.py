@@ -194,8 +194,8 @@ def test_signals_are_without_the_errors_and_channels_keep_them() -> None:
 
 def test_what_is_left_open_is_less_with_a_calibration_and_no_less_beyond_what_it_covered() -> None:
     def spread(lasers: tuple[float, float], one: LaserCalibration | None) -> dict[str, float]:
-        coupled = PeakReadings(0.01, 1.0, lasers, (0.0, 0.0), np.zeros((2, 1)), (0.02, 0.02), 1.0, True)
-        bare = PeakReadings(0.02, 1.0, (0.002, 0.022), (0.0, 0.0), np.zeros((2, 1)), (0.02, 0.02), 1.0, True)
+        coupled = PeakReadings(0.01, 1.0, lasers, (0.0, 0.0), np.zeros((2, 1)), (0.02, 0.02), True)
+        bare = PeakReadings(0.02, 1.0, (0.002, 0.022), (0.0, 0.0), np.zeros((2, 1)), (0.02, 0.02), True)
         doubt = SensorUncertainty(SensorAccuracy(), (RANGE, RANGE), one)
         errors = doubt.drift_errors((bare, coupled), Draws(np.random.default_rng(1), 4000))
         return {name: float(np.std(each[1] / 0.01 - each[0] / 0.02)) for name, each in errors.items()}
