@@ -84,6 +84,11 @@ SEGMENT, MOST_SECTIONS = 4.0, 4
 its own spectrum: the rounding errors of fast motions are white, those of slow motions are not.
 """
 
+BESIDE = 0.75
+"""Distance from a mode within which the spectrum of the residual is not used [Hz]: there it contains the wander of the
+lasers' delays, a source of its own. With the fastest assumed clock, a mode has the largest sidebands 0.4 Hz away.
+"""
+
 BAND = 30.0
 """Upper frequency of the band in which the noise of the table's sensor at rest is evaluated [Hz]."""
 
@@ -195,11 +200,11 @@ def _sections(n: int, length: int) -> Array:
 
 
 def _noise_passes(frequency: Array, fit: Fit) -> NDArray[np.bool_]:
-    """Mask of the frequencies (in cycles per sample) at which the fit absorbs no noise: those away from the modes and
-    from zero.
+    """Mask of the frequencies (in cycles per sample) at which the residual is noise alone: away from zero and from the
+    modes, where the fit absorbs noise.
     """
     modes = np.abs(fit.response.poles) * fit.stretch.step / (2.0 * np.pi)
-    apart = 1.5 * frequency[1]
+    apart = max(1.5 * frequency[1], BESIDE * fit.stretch.step)
     return (frequency > 0.0) & (np.abs(frequency[:, None] - modes) > apart).all(axis=1)
 
 

@@ -11,7 +11,7 @@ from bench.app.cli.main import main
 from bench.datafile.reader import open_datafile
 from protocols.common.sine.holding import HoldCycle
 
-pytestmark = pytest.mark.usefixtures("shared_results")
+pytestmark = pytest.mark.usefixtures("shared_results", "few_specimens")
 
 QUICK = ["--settle-limit", "30", "--ramp-time", "4", "--harmonics", "5", "--starts", "2"]
 

@@ -1,0 +1,17 @@
+"""Ranges of the free motions of unstable points, in tests that are about other things."""
+
+from collections.abc import Iterator
+
+import pytest
+
+from protocols.harmonic import free_prediction
+
+
+@pytest.fixture(scope="module")
+def few_specimens() -> Iterator[None]:
+    """The ranges are those of 21 drawn specimens, hardly more than the 20 with which peaks are compared with them: 39
+    take five seconds of processor time.
+    """
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(free_prediction, "MEMBERS", 21)
+        yield
