@@ -6,7 +6,9 @@ from math import nan
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.analysis.drift_zero import drift_zero
 from bench.analysis.fall import FallWatch
+from bench.analysis.linearity import LinearFrame
 from bench.analysis.signals import ACCELERATION, DISPLACEMENT, DRIFT, LASER_1, LASER_2, SIGNALS, U1
 from bench.analysis.transient_base import BaseMotion, base_motion
 from bench.analysis.transient_peak import RunningPeak, TransientPeak, running_peak, transient_peak
@@ -33,7 +35,8 @@ class PeakSeen:
     `lasers` [m] are the readings of the lasers and `table` [m] the table's displacement, both positive in the direction
     of the peak; `speeds` [m/s] are the rates of change of the lasers' signals, and `swings` [m] the ranges of these
     signals within the fit window. `others` are peaks of other half cycles that are almost as large: the largest true
-    one may be among them.
+    one may be among them. `zero` [m], shape (2, n), are readings of the lasers whose mean is the zero of the peak; None
+    if it was taken at rest.
     """
 
     peak: TransientPeak
@@ -42,29 +45,41 @@ class PeakSeen:
     swings: tuple[float, float]
     table: float
     others: tuple["PeakSeen", ...] = ()
+    zero: Array | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class Observed:
-    """Measurement under one record: peaks of `drift` and `u1` [m], and `history`, the drift [m] at every sample."""
+    """Measurement under one record: motion of the table, peaks of `drift` and `u1` [m]."""
 
     base: BaseMotion
     drift: PeakSeen
     u1: PeakSeen
-    history: Array
 
 
-def observe(signals: Array, rest: int, sample_rate: float) -> Observed:
+def observe(signals: Array, rest: int, sample_rate: float, frame: LinearFrame | None = None) -> Observed:
     """Evaluate the signals of a complete record, shape (n, len(SIGNALS)), whose first `rest` samples are at rest.
-    Raises InvalidInput for signals without a measurable motion or peak.
+
+    With the `frame`, the zero of the drift is that from the momentum of its second storey, if the motion is long
+    enough; without it, that at rest. Raises InvalidInput for signals without a measurable motion or peak.
     """
     still = signals[: round(QUIET * rest)]
+    zero = None if frame is None else drift_zero(signals, frame, sample_rate)
+    centred = signals
+    if zero is not None:
+        centred = signals.copy()
+        centred[:, DRIFT] -= zero.drift
+    drift = _with_others(_sensor_peak(centred, still, DRIFT, sample_rate), centred, still, sample_rate)
     return Observed(
         base=base_motion(signals, still, sample_rate),
-        drift=_with_others(_sensor_peak(signals, still, DRIFT, sample_rate), signals, still, sample_rate),
+        drift=drift if zero is None else _from(drift, zero.readings),
         u1=_sensor_peak(signals, still, U1, sample_rate),
-        history=signals[:, DRIFT],
     )
+
+
+def _from(seen: PeakSeen, zero: Array) -> PeakSeen:
+    """The peak and its rivals with the readings of the lasers at their `zero`."""
+    return replace(seen, zero=zero, others=tuple(_from(each, zero) for each in seen.others))
 
 
 NEAR = 0.02

@@ -28,8 +28,9 @@ from bench.protocol import each_step
 from drivers.rig import OperatorTask, RigError
 from protocols.common.identification.plan import identified
 from protocols.common.replicate import replicate, table_motion
+from protocols.common.sine.settling import linear_frame
 from protocols.earthquake.laser_check import LaserCheck
-from protocols.earthquake.measurement import GainMonitor, Histories, History, observe, tracking
+from protocols.earthquake.measurement import GainMonitor, Histories, History, Observed, observe, tracking
 from protocols.earthquake.points import (
     BareTest,
     measured_point,
@@ -192,9 +193,8 @@ class EarthquakePlan:
         outcome = yield from self._play(shaking, replication.drive, monitor)
         if not isinstance(outcome, Played):
             raise RigError(NO_BLOCK)
-        rate = shaking.target.sample_rate
         try:
-            observed = observe(outcome.signals, shaking.target.rest, rate)
+            observed = self._observed(shaking, outcome.signals)
         except InvalidInput as lost:
             yield Publish(Warned(f"{shaking.name}: the test of the bare frame cannot be evaluated: {lost}"))
             return f"the test of the bare frame cannot be evaluated: {lost}"
@@ -244,11 +244,10 @@ class EarthquakePlan:
         target, p = self._target(shaking, specimen), self._parameters
         seed = SEED + self._points
         if isinstance(outcome, Played):
-            rate = shaking.target.sample_rate
             play = f"beta = {specimen.label:g}"
             yield Publish(table_motion(shaking.name, play, shaking.target, outcome.signals[:, ACCELERATION]))
             try:
-                observed = observe(outcome.signals, shaking.target.rest, rate)
+                observed = self._observed(shaking, outcome.signals)
             except InvalidInput as lost:
                 return unplayed_point(shaking, specimen.label or 0.0, target, bare, f"not evaluated: {lost}")
             expected = History.of(specimen, observed.base).drift
@@ -267,6 +266,13 @@ class EarthquakePlan:
             )
         signals = bare.signals[:0] if outcome.signals is None else outcome.signals
         return overturned_point(shaking, specimen, bare, signals, target, self._configuration, p.draws, seed)
+
+    def _observed(self, shaking: Shaking, signals: NDArray[np.float64]) -> Observed:
+        """Evaluate the signals of a record. The mean over the motion as the zero of the drift has the errors of the
+        lasers at all places of the motion: it is used if the shapes of these errors were checked.
+        """
+        frame = None if self._checks is None else linear_frame(self._configuration)
+        return observe(signals, shaking.target.rest, shaking.target.sample_rate, frame)
 
     def _play(
         self, shaking: Shaking, drive: NDArray[np.float64], monitor: GainMonitor

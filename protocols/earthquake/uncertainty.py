@@ -252,7 +252,7 @@ def _sighting(seen: PeakSeen) -> PeakReadings:
         sign=sign,
         lasers=(sign * seen.lasers[0], sign * seen.lasers[1]),
         speeds=seen.speeds,
-        zero=np.zeros((2, 1)),
+        zero=np.zeros((2, 1)) if seen.zero is None else seen.zero,
         swings=seen.swings,
-        at_rest=True,
+        at_rest=seen.zero is None,
     )

@@ -8,6 +8,7 @@ from functools import lru_cache
 import numpy as np
 
 from bench.accelerograms.reference import RecordReference
+from bench.analysis.linearity import LinearFrame
 from bench.analysis.sensor_accuracy import SensorUncertainty
 from bench.analysis.table_motion import table_motion, with_final_rest
 from bench.config.model import BenchConfiguration
@@ -26,6 +27,8 @@ LOWEST, STRENGTH = 0.8, 1.3
 """Lowest frequency of a record [Hz], and its peak over the uplift acceleration."""
 
 DRAWS = 4000
+
+FRAME = LinearFrame(Specimen().bare(), grounded=True)
 
 DISTORTION = 0.01
 """Third harmonic of the table under the sine that checks the lasers, which is not controlled."""
@@ -91,7 +94,8 @@ def measured(seed: int, name: str, beta: float, case: Case, *, checked: bool = F
     if checked:
         check, moved = check_and_motion()
         checks = check.evaluate(sensors.signals(moved, found)[REST:], BenchConfiguration())
-    seen = [observe(sensors.signals(motion, found), REST, RATE).drift for motion in (bare, coupled)]
+    frame = FRAME if checked else None
+    seen = [observe(sensors.signals(motion, found), REST, RATE, frame).drift for motion in (bare, coupled)]
     accuracy = SensorUncertainty(ACCURACY, RANGES, found).checked_by(checks)
     drawn = drift_errors((seen[0], seen[1]), accuracy, DRAWS, seed)
     together = np.sum(list(drawn.values()), axis=0)

@@ -86,7 +86,8 @@ its own spectrum: the rounding errors of fast motions are white, those of slow m
 
 BESIDE = 0.75
 """Distance from a mode within which the spectrum of the residual is not used [Hz]: there it contains the wander of the
-lasers' delays, a source of its own. With the fastest assumed clock, a mode has the largest sidebands 0.4 Hz away.
+lasers' delays, a source of its own. With the fastest assumed clock, a mode has the largest sidebands 0.4 Hz away. A
+decay of one section is too short to tell them from the mode.
 """
 
 BAND = 30.0
@@ -179,7 +180,7 @@ def _noise(fit: Fit) -> Array:
             # the spectrum of the samples around the middle, where a section counts most
             found = welch(residual[weight > 0.5], nperseg=length)
             frequency, density = np.asarray(found[0], np.float64), np.asarray(found[1], np.float64)
-            left = _noise_passes(frequency, fit)
+            left = _noise_passes(frequency, fit, BESIDE if len(sections) > 1 else 0.0)
             # half the one-sided density is the variance of the equivalent white noise
             power = np.interp(np.fft.rfftfreq(n), frequency[left], density[left] / 2.0)
             turned = np.fft.rfft(jacobian * weight)
@@ -199,12 +200,12 @@ def _sections(n: int, length: int) -> Array:
     return np.sqrt(np.maximum(1.0 - apart, 0.0))
 
 
-def _noise_passes(frequency: Array, fit: Fit) -> NDArray[np.bool_]:
+def _noise_passes(frequency: Array, fit: Fit, beside: float) -> NDArray[np.bool_]:
     """Mask of the frequencies (in cycles per sample) at which the residual is noise alone: away from zero and from the
-    modes, where the fit absorbs noise.
+    modes, where the fit absorbs noise, and further than `beside` [Hz] from the modes.
     """
     modes = np.abs(fit.response.poles) * fit.stretch.step / (2.0 * np.pi)
-    apart = max(1.5 * frequency[1], BESIDE * fit.stretch.step)
+    apart = max(1.5 * frequency[1], beside * fit.stretch.step)
     return (frequency > 0.0) & (np.abs(frequency[:, None] - modes) > apart).all(axis=1)
 
 

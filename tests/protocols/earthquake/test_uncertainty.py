@@ -61,7 +61,7 @@ NONE = SpecimenUncertainty(stiffness=0.0, damping=0.0, restitution=0.0, spring=0
 def shown(motion: BaseMotion, noise: float = 0.0) -> Observed:
     peak = TransientPeak(0.02, 0.02 * noise, 0.0, 1.0, 1, 0.03, 0)
     seen = PeakSeen(peak, (0.0, 0.0), (0.0, 0.0), (0.0, 0.0), 0.0)
-    return Observed(motion, seen, seen, np.zeros(1))
+    return Observed(motion, seen, seen)
 
 
 def compared(
