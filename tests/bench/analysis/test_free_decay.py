@@ -156,6 +156,26 @@ def test_noise_counts_when_it_matters(loud_first: bool, monkeypatch: pytest.Monk
     assert alike < 0.8 if loud_first else alike > 1.6, alike
 
 
+def test_the_wander_of_a_clock_is_not_counted_as_noise_as_well(monkeypatch: pytest.MonkeyPatch) -> None:
+    stretch = released_decay(released(constants()), setting()).fit.stretch
+    fit, random = fit_from_scratch(stretch, setting().masses), np.random.default_rng(9)
+    speed = np.gradient(fit.fitted, stretch.step, axis=1)
+    # the delay of each laser wanders through one measuring period within 2.5 s
+    late = 2.5e-4 * ((0.4 * stretch.time + np.array([[0.1], [0.6]])) % 1.0 - 0.5)
+    white = 1e-5 * random.standard_normal(speed.shape)
+    left = [each - np.tensordot(fit.moved(each[None])[0], fit.jacobian, 1) for each in (white, white + speed * late)]
+
+    def added() -> float:
+        """Variance of xi1 that the wander adds to that of the noise, relative to the latter."""
+        errors = Errors(sensors(SensorAccuracy()), 0.0, np.zeros((2, 2)))
+        parts = [fit_uncertainty(replace(fit, residual=each), errors).parts["noise"][XI1, XI1] for each in left]
+        return float(parts[1] / parts[0]) - 1.0
+
+    found = added()
+    monkeypatch.setattr("bench.analysis.free_decay.covariance.BESIDE", 0.0)
+    assert added() > 4.0 * found > 1.0
+
+
 def test_weighing_errors_move_the_stiffness_as_stated() -> None:
     signals, off = recording(constants()), 1e-3
     errors = np.diag([0.0004**2, 0.0007**2])
