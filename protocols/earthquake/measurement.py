@@ -1,145 +1,21 @@
-"""Measured and predicted response to a played record: table motion, peaks, overturning, running gain and histories."""
+"""Measured and predicted response to a played record: tracking, overturning, running gain and histories."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from math import nan
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.analysis.drift_zero import drift_zero
 from bench.analysis.fall import FallWatch
-from bench.analysis.linearity import LinearFrame
-from bench.analysis.signals import ACCELERATION, DISPLACEMENT, DRIFT, LASER_1, LASER_2, SIGNALS, U1
-from bench.analysis.transient_base import BaseMotion, base_motion
-from bench.analysis.transient_peak import RunningPeak, TransientPeak, running_peak, transient_peak
+from bench.analysis.signals import ACCELERATION, DRIFT, U1
+from bench.analysis.transient_base import BaseMotion
+from bench.analysis.transient_peak import RunningPeak, running_peak
 from bench.control.passes import SpectrumCheck
 from bench.control.starts import CATCH_ANGLE
 from bench.live_values import RunningGain
 from protocols.earthquake.records import Shaking
-from sim.errors import InvalidInput
 from sim.rocking import simulate
 from sim.specimen import Specimen
-
-Array = NDArray[np.float64]
-
-QUIET = 0.5
-"""Fraction of the rest before a record that is used to determine the noise; in the remainder, the zero-phase filters
-already respond to the record.
-"""
-
-
-@dataclass(frozen=True)
-class PeakSeen:
-    """A peak, and the sensor signals at its time.
-
-    `lasers` [m] are the readings of the lasers and `table` [m] the table's displacement, both positive in the direction
-    of the peak; `speeds` [m/s] are the rates of change of the lasers' signals, and `swings` [m] the ranges of these
-    signals within the fit window. `others` are peaks of other half cycles that are almost as large: the largest true
-    one may be among them. `zero` [m], shape (2, n), are readings of the lasers whose mean is the zero of the peak; None
-    if it was taken at rest.
-    """
-
-    peak: TransientPeak
-    lasers: tuple[float, float]
-    speeds: tuple[float, float]
-    swings: tuple[float, float]
-    table: float
-    others: tuple["PeakSeen", ...] = ()
-    zero: Array | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class Observed:
-    """Measurement under one record: motion of the table, peaks of `drift` and `u1` [m]."""
-
-    base: BaseMotion
-    drift: PeakSeen
-    u1: PeakSeen
-
-
-def observe(signals: Array, rest: int, sample_rate: float, frame: LinearFrame | None = None) -> Observed:
-    """Evaluate the signals of a complete record, shape (n, len(SIGNALS)), whose first `rest` samples are at rest.
-
-    With the `frame`, the zero of the drift is that from the momentum of its second storey, if the motion is long
-    enough; without it, that at rest. Raises InvalidInput for signals without a measurable motion or peak.
-    """
-    still = signals[: round(QUIET * rest)]
-    zero = None if frame is None else drift_zero(signals, frame, sample_rate)
-    centred = signals
-    if zero is not None:
-        centred = signals.copy()
-        centred[:, DRIFT] -= zero.drift
-    drift = _with_others(_sensor_peak(centred, still, DRIFT, sample_rate), centred, still, sample_rate)
-    return Observed(
-        base=base_motion(signals, still, sample_rate),
-        drift=drift if zero is None else _from(drift, zero.readings),
-        u1=_sensor_peak(signals, still, U1, sample_rate),
-    )
-
-
-def _from(seen: PeakSeen, zero: Array) -> PeakSeen:
-    """The peak and its rivals with the readings of the lasers at their `zero`."""
-    return replace(seen, zero=zero, others=tuple(_from(each, zero) for each in seen.others))
-
-
-NEAR = 0.02
-"""Relative difference from the largest peak up to which another peak may be larger, given the errors of the lasers."""
-
-_MOST = 4
-
-
-def _with_others(seen: PeakSeen, signals: Array, still: Array, sample_rate: float) -> PeakSeen:
-    """The peak of the drift with those of other half cycles that are at most `NEAR` smaller."""
-    others, last = list[PeakSeen](), seen
-    left = signals.copy()
-    while len(others) < _MOST:
-        _remove(left[:, DRIFT], last.peak, sample_rate)
-        try:
-            last = _sensor_peak(left, still, DRIFT, sample_rate)
-        except InvalidInput:
-            break
-        if last.peak.value < (1.0 - NEAR) * seen.peak.value:
-            break
-        others.append(last)
-    return replace(seen, others=tuple(others))
-
-
-def _remove(values: Array, peak: TransientPeak, sample_rate: float) -> None:
-    """Clip the half cycle of a peak at half its height."""
-    place, half = round(peak.time * sample_rate), 0.5 * peak.sign * peak.value
-    beyond = np.flatnonzero(~(peak.sign * values > abs(half)))
-    end = int(np.searchsorted(beyond, place))
-    begin = int(beyond[end - 1]) + 1 if end else 0
-    values[begin : int(beyond[end]) if end < beyond.size else values.size] = half
-
-
-def _sensor_peak(signals: Array, still: Array, column: int, sample_rate: float) -> PeakSeen:
-    values, quiet = signals[:, column], still[:, column]
-    peak = transient_peak(values, quiet[np.isfinite(quiet)], sample_rate)
-    place, half = round(peak.time * sample_rate), max(round(peak.window * sample_rate), 2)
-    window = signals[max(place - half, 0) : place + half + 1]
-    # values and rates come from a fit over the window, which is insensitive to single samples
-    time = (np.arange(len(window)) - min(place, half)) / sample_rate
-    lines = [_line(time, window[:, each], SIGNALS[each]) for each in (LASER_1, LASER_2, DISPLACEMENT)]
-    (first, v1), (second, v2), (table, _) = lines
-    swings = [float(np.nanmax(window[:, each]) - np.nanmin(window[:, each])) for each in (LASER_1, LASER_2)]
-    return PeakSeen(
-        peak,
-        lasers=(peak.sign * first, peak.sign * second),
-        speeds=(v1, v2),
-        swings=(swings[0], swings[1]),
-        table=peak.sign * table,
-    )
-
-
-def _line(time: Array, values: Array, name: str) -> tuple[float, float]:
-    known = np.isfinite(values)
-    if np.count_nonzero(known) < 3:
-        raise InvalidInput(name, f"{np.count_nonzero(known)} valid samples", "it has too few of them around the peak")
-    # a parabola, since a straight line misses the value at a turning point
-    parabola = np.polynomial.Polynomial.fit(time[known], values[known], 2).convert()
-    return float(parabola(0.0)), float(parabola.deriv()(0.0))
-
 
 Array = NDArray[np.float64]
 
@@ -204,8 +80,6 @@ def overturning_time(signals: NDArray[np.float64], sample_rate: float, specimen:
     below = np.flatnonzero(np.abs(mean) <= FallWatch(specimen, sample_rate).threshold)
     return float((below[-1] + 1 if below.size else 0) / sample_rate)
 
-
-Array = NDArray[np.float64]
 
 TOLERANCE = 1e-8
 """Relative tolerance of simulated responses."""
@@ -288,9 +162,6 @@ def _running_gain(bare: History, coupled: History) -> Array:
     # no gain after the block topples, although the earlier peak remains
     np.divide(running_peak(coupled.padded(size)), below, out=gain, where=below > 0.0)
     return np.where(np.isnan(coupled.padded(size)), nan, gain)
-
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -30,7 +30,8 @@ from protocols.common.identification.plan import identified
 from protocols.common.replicate import replicate, table_motion
 from protocols.common.sine.settling import linear_frame
 from protocols.earthquake.laser_check import LaserCheck
-from protocols.earthquake.measurement import GainMonitor, Histories, History, Observed, observe, tracking
+from protocols.earthquake.measurement import GainMonitor, Histories, History, tracking
+from protocols.earthquake.observation import Observed, observe
 from protocols.earthquake.points import (
     BareTest,
     measured_point,
@@ -268,8 +269,8 @@ class EarthquakePlan:
         return overturned_point(shaking, specimen, bare, signals, target, self._configuration, p.draws, seed)
 
     def _observed(self, shaking: Shaking, signals: NDArray[np.float64]) -> Observed:
-        """Evaluate the signals of a record. The mean over the motion as the zero of the drift has the errors of the
-        lasers at all places of the motion: it is used if the shapes of these errors were checked.
+        """Evaluate the signals of a record. The zero from momentum has the errors of the lasers at all places of the
+        motion: it is evaluated if the shapes of these errors were checked.
         """
         frame = None if self._checks is None else linear_frame(self._configuration)
         return observe(signals, shaking.target.rest, shaking.target.sample_rate, frame)

@@ -1,7 +1,7 @@
 """Points for the outcomes of a record: measured, overturned, or not played."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,10 +12,11 @@ from bench.config.model import BenchConfiguration
 from bench.control.passes import Pass
 from protocols.common.replicate import Replicated
 from protocols.earthquake.draws import predict_draws
-from protocols.earthquake.measurement import Observed, Tracking, difference, overturning_time, tracking
+from protocols.earthquake.measurement import Tracking, difference, overturning_time, tracking
+from protocols.earthquake.observation import Observed
 from protocols.earthquake.protocol import EarthquakeParameters, EarthquakePoint, PointStatus
 from protocols.earthquake.records import Shaking
-from protocols.earthquake.uncertainty import Compared, compare
+from protocols.earthquake.uncertainty import Compared, compare, with_better_zero
 from sim.specimen import Specimen
 
 Array = NDArray[np.float64]
@@ -71,7 +72,10 @@ def measured_point(
     """Point of a record without toppling, compared with the model under both achieved motions; `checks` are the result
     of a check of the lasers.
     """
-    found = compare(bare.observed, observed, specimen, configuration, draws, seed, checks)
+    sensors = configuration.sensors.checked_by(checks)
+    reference, observed = with_better_zero(bare.observed, observed, sensors, draws, seed)
+    bare = replace(bare, observed=reference)
+    found = compare(reference, observed, specimen, configuration, draws, seed, checks)
     moved = tracking(shaking, signals)
     return EarthquakePoint.model_validate(
         {

@@ -22,7 +22,8 @@ from bench.figures.earthquake_figure import DriftPicture, MotionPicture, drift_f
 from bench.live_values import RunningGain
 from protocols.common.budgets import budget_parts, budgeted
 from protocols.earthquake.campaign import check_statement
-from protocols.earthquake.measurement import STEP, History, observe
+from protocols.earthquake.measurement import STEP, History
+from protocols.earthquake.observation import observe
 from protocols.earthquake.protocol import EarthquakeParameters
 from protocols.earthquake.records import FileSources, Shaking, band_used, shakings
 from sim.errors import InvalidInput

@@ -11,7 +11,7 @@ changes the gain as much as all of them together.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.random import SeedSequence
@@ -22,7 +22,7 @@ from bench.analysis.sensor_accuracy import Draws, PeakReadings, SensorUncertaint
 from bench.analysis.uncertainty import COVERAGE, NOISE, Budget
 from bench.config.model import BenchConfiguration
 from protocols.earthquake.draws import Predicted, predict_draws
-from protocols.earthquake.measurement import Observed, PeakSeen
+from protocols.earthquake.observation import Observed, PeakSeen
 from sim.knowledge import SpecimenKnowledge
 from sim.specimen import Specimen
 
@@ -217,6 +217,23 @@ def drift_errors(
             largest[test] = np.maximum(largest[test], each)
         parts[CHOICE] = (true[:2] - largest) / drifts[:2]
     return parts
+
+
+def with_better_zero(
+    bare: Observed, coupled: Observed, sensors: SensorUncertainty, n: int, seed: int
+) -> tuple[Observed, Observed]:
+    """Both tests, their drifts relative to that zero, at rest or from momentum, with which the ratio of the drifts has
+    the smaller uncertainty: at rest each laser has a rounding error, in motion the mean linearity error of all places.
+    """
+    if bare.centred is None or coupled.centred is None:
+        return bare, coupled
+    moved = replace(bare, drift=bare.centred), replace(coupled, drift=coupled.centred)
+
+    def spread(tests: tuple[Observed, Observed]) -> float:
+        errors = drift_errors((tests[0].drift, tests[1].drift), sensors, n, seed)
+        return float(_ratio(np.sum(list(errors.values()), axis=0)).std())
+
+    return min((bare, coupled), moved, key=spread)
 
 
 def u1_errors(

@@ -13,9 +13,9 @@ from bench.analysis.sensor_accuracy import SensorUncertainty
 from bench.analysis.table_motion import table_motion, with_final_rest
 from bench.config.model import BenchConfiguration
 from protocols.earthquake.laser_check import LaserCheck, laser_check
-from protocols.earthquake.measurement import observe
+from protocols.earthquake.observation import observe
 from protocols.earthquake.protocol import EarthquakeParameters
-from protocols.earthquake.uncertainty import drift_errors
+from protocols.earthquake.uncertainty import drift_errors, with_better_zero
 from protocols.harmonic.protocol import HarmonicParameters
 from sim.excitation import SampledRecord
 from sim.rocking import simulate
@@ -94,9 +94,9 @@ def measured(seed: int, name: str, beta: float, case: Case, *, checked: bool = F
     if checked:
         check, moved = check_and_motion()
         checks = check.evaluate(sensors.signals(moved, found)[REST:], BenchConfiguration())
-    frame = FRAME if checked else None
-    seen = [observe(sensors.signals(motion, found), REST, RATE, frame).drift for motion in (bare, coupled)]
-    accuracy = SensorUncertainty(ACCURACY, RANGES, found).checked_by(checks)
+    frame, accuracy = FRAME if checked else None, SensorUncertainty(ACCURACY, RANGES, found).checked_by(checks)
+    tests = [observe(sensors.signals(motion, found), REST, RATE, frame) for motion in (bare, coupled)]
+    seen = [each.drift for each in with_better_zero(tests[0], tests[1], accuracy, DRAWS, seed)]
     drawn = drift_errors((seen[0], seen[1]), accuracy, DRAWS, seed)
     together = np.sum(list(drawn.values()), axis=0)
     ratio = seen[1].peak.value / seen[0].peak.value

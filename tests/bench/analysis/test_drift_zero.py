@@ -8,8 +8,10 @@ from numpy.typing import NDArray
 
 from bench.analysis.drift_zero import PLACES, drift_zero
 from bench.analysis.linearity import LinearFrame
+from bench.analysis.sensor_accuracy import SensorAccuracy, SensorUncertainty
 from bench.analysis.signals import DISPLACEMENT, DRIFT, LASER_1, LASER_2
-from protocols.earthquake.measurement import observe
+from protocols.earthquake.observation import observe
+from protocols.earthquake.uncertainty import with_better_zero
 from sim.specimen import Specimen
 from tests.benchmarks.coverage_record import motion_under
 from tests.benchmarks.coverage_sensors import RATE, REST
@@ -96,12 +98,27 @@ def test_the_peak_is_free_of_the_rounding_at_rest() -> None:
     noise = 1e-6 * np.random.default_rng(1).standard_normal((len(signals), 6))
     for offsets in OFFSETS[:12]:
         seen = read(signals, offsets) + noise
-        for momentum, found in errors.items():
-            observed = observe(seen, REST, RATE, frame() if momentum else None).drift
-            assert (observed.zero is None) is not momentum
-            found.append(observed.peak.value - true)
+        observed = observe(seen, REST, RATE, frame())
+        assert observed.centred is not None
+        assert observed.centred.zero is not None
+        for momentum, peak in ((False, observed.drift), (True, observed.centred)):
+            errors[momentum].append(peak.peak.value - true)
     assert np.std(errors[False]) > 0.3 * STEP
     assert np.std(errors[True]) < 0.4 * np.std(errors[False])
+
+
+@pytest.mark.parametrize(("resolution", "linearity", "momentum"), [(STEP, 0.0, True), (0.0, 0.0008, False)])
+def test_of_both_zeros_the_one_with_the_smaller_uncertainty_is_used(
+    resolution: float, linearity: float, momentum: bool
+) -> None:
+    """Rounding enters at rest alone; the least favourable linearity error is larger relative to a mean, here."""
+    tests = [observe(moved(beta), REST, RATE, frame()) for beta in (None, 0.97)]
+    accuracy = SensorAccuracy(laser_resolution=resolution, laser_linearity=linearity, laser_timing=0.0)
+    sensors = SensorUncertainty(accuracy, (0.2, 0.2))
+    chosen = with_better_zero(tests[0], tests[1], sensors, 2000, 1)
+    for test, found in zip(tests, chosen, strict=True):
+        assert found.drift is (test.centred if momentum else test.drift)
+        assert found.u1 is test.u1
 
 
 def test_missing_samples_are_bridged_as_long_as_they_are_few() -> None:

@@ -15,7 +15,7 @@ from bench.control.target import Reach
 from bench.datafile.reader import open_datafile
 from protocols.common.sine.settling import linear_frame
 from protocols.earthquake.laser_check import ABOVE, INSIDE, LaserCheck, laser_check
-from protocols.earthquake.measurement import observe
+from protocols.earthquake.observation import observe
 from protocols.earthquake.protocol import EarthquakeParameters
 from protocols.earthquake.uncertainty import CHOICE, drift_errors
 from sim.errors import InvalidInput

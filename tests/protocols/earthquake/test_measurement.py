@@ -13,7 +13,8 @@ from bench.analysis.transient_base import BaseMotion
 from bench.analysis.transient_peak import TransientPeak
 from protocols.earthquake.campaign import check_statement
 from protocols.earthquake.draws import predict_draws
-from protocols.earthquake.measurement import STEP, GainMonitor, History, PeakSeen, observe, overturning_time
+from protocols.earthquake.measurement import STEP, GainMonitor, History, overturning_time
+from protocols.earthquake.observation import PeakSeen, observe
 from protocols.earthquake.uncertainty import drift_errors
 from sim.errors import InvalidInput
 from sim.excitation import SampledRecord

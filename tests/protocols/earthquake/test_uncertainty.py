@@ -17,7 +17,8 @@ from bench.analysis.transient_peak import TransientPeak
 from bench.config.model import BenchConfiguration
 from protocols.earthquake import uncertainty
 from protocols.earthquake.draws import Predicted
-from protocols.earthquake.measurement import Observed, PeakSeen, observe, overturning_time
+from protocols.earthquake.measurement import overturning_time
+from protocols.earthquake.observation import Observed, PeakSeen, observe
 from protocols.earthquake.points import _remarks
 from protocols.earthquake.uncertainty import Compared, compare
 from sim.excitation import SampledRecord
