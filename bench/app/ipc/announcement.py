@@ -55,7 +55,8 @@ def announced(server: SessionServer, run: Run, owner: str) -> Generator[None]:
         server.broadcast.put(Published(Warned(why, time=0.0)))
         yield
         return
-    over = threading.Event()
+    # a closed listener has no address
+    over, address = threading.Event(), listener.address
 
     def admit(connection: Connection) -> None:
         """Attach a client that has the key."""
@@ -80,7 +81,7 @@ def announced(server: SessionServer, run: Run, owner: str) -> Generator[None]:
 
     def wake() -> None:
         with suppress(OSError, EOFError):
-            Client(listener.address).close()
+            Client(address).close()
 
     thread = threading.Thread(target=accept, name="attaching", daemon=True)
     thread.start()

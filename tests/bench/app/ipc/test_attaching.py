@@ -1,10 +1,12 @@
 """Clients that attach to a session: one that is silent, frozen or faulty affects neither the others nor the end."""
 
+import threading
 from collections.abc import Generator
 from contextlib import contextmanager
 from multiprocessing import AuthenticationError, Pipe
 from multiprocessing.connection import Client
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -59,6 +61,23 @@ def test_a_client_without_the_key_is_refused(tmp_path: Path, monkeypatch: pytest
             Client(found.address, authkey=b"another")
         with Client(found.address, authkey=bytes.fromhex(found.key)) as client:
             assert isinstance(client.recv(), Attached)
+
+
+def test_a_listener_that_has_closed_by_itself_is_no_error_at_the_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Last(threading.Event):
+        """A client comes just when the session ends, so that the listener closes before it is woken."""
+
+        def set(self) -> None:
+            super().set()
+            Client(found.address).close()
+            eventually(lambda: all(each.name != "attaching" for each in threading.enumerate()))
+
+    monkeypatch.setattr(announcement, "threading", SimpleNamespace(Event=Last, Thread=threading.Thread))
+    with session(tmp_path, monkeypatch) as (found, _):
+        pass
+    eventually(lambda: all(each.name != "end of attaching" for each in threading.enumerate()))
 
 
 def test_an_abort_after_a_message_that_cannot_be_compared_is_carried_out(tmp_path: Path) -> None:
