@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.analysis.cycles import Cycle, Waves, mean_amplitude, mean_waves
-from bench.analysis.linearity import Checks, Harmonics, LinearFrame
+from bench.analysis.error_curve import Checks, Harmonics
+from bench.analysis.linearity import LinearFrame
 from bench.analysis.remaining_transient import remaining_transient
 from bench.analysis.rounding import FittedPeak
 from bench.analysis.sensor_accuracy import Draws, PeakReadings, SensorUncertainty, Shapes

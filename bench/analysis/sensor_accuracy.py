@@ -16,8 +16,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.analysis.error_curve import Checks, Harmonics, widest
 from bench.analysis.laser_calibration import LaserCalibration
-from bench.analysis.linearity import SMOOTH, Checks, Effect, LinearityErrors, linearity_errors, widest
+from bench.analysis.linearity import SMOOTH, Effect, LinearityErrors, linearity_errors
 from bench.analysis.rounding import FittedPeak
 from sim.parameters import Parameters, quantity
 
@@ -111,13 +112,15 @@ class SensorUncertainty:
     """Uncertainty of the sensors from data sheets or a calibration.
 
     `ranges` are the lasers' measuring ranges [m]; `checks` are the harmonics of their readings in tests of the bare
-    frame.
+    frame; `corrected` states whether the readings are corrected for the errors that the checks lead to expect
+    (`bench.analysis.reading_correction`).
     """
 
     accuracy: SensorAccuracy
     ranges: tuple[float, float]
     calibration: LaserCalibration | None = None
     checks: tuple[Checks, ...] = ()
+    corrected: bool = False
 
     @property
     def table_scale(self) -> float:
@@ -143,6 +146,19 @@ class SensorUncertainty:
         None.
         """
         return self if self.checks or checks is None else replace(self, checks=(checks,))
+
+    def corrected_by(self, checks: Checks | None) -> "SensorUncertainty":
+        """A copy with `checks` for corrected readings; calibrated lasers are checked only. The same object if `checks`
+        is None.
+        """
+        if checks is None:
+            return self
+        return replace(self, checks=(checks,), corrected=self.calibration is None)
+
+    def checks_of(self, laser: int) -> list[Harmonics]:
+        """The checks of laser 0 or 1 that are evaluated, with the uncertainty due to its resolution."""
+        step = self.accuracy.laser_resolution
+        return [each.rounded(step) for each in widest([both[laser] for both in self.checks])]
 
     def drift_errors(
         self, seen: Sequence[PeakReadings], draws: "Draws", shapes: "Shapes | None" = None
@@ -213,9 +229,7 @@ class SensorUncertainty:
         limit = self.accuracy.laser_linearity * whole
         effects = [each.effect(laser) for each in seen]
         if self.calibration is None:
-            step = self.accuracy.laser_resolution
-            checks = [each.rounded(step) for each in widest([both[laser] for both in self.checks])]
-            return linearity_errors(effects, _shares(seen), limit, whole, checks)
+            return linearity_errors(effects, _shares(seen), limit, whole, self.checks_of(laser), self.corrected)
         found = self.calibration.lasers[laser]
         low, high = found.lowest - found.rest, found.highest - found.rest
         beyond = [_beyond(each, low, high) for each in effects]
@@ -241,12 +255,11 @@ class SensorUncertainty:
         if self.calibration is None:
             return None
         # the harmonics that remain in the corrected readings of the bare frame check the reference sensor
-        curves, step = self.calibration.lasers, self.accuracy.laser_resolution
-        kept = [widest([both[laser] for both in self.checks]) for laser in (0, 1)]
+        kept = [self.checks_of(laser) for laser in (0, 1)]
         checks = [
-            each.rounded(step).with_uncertainty(curve.uncertainty)
+            each.with_uncertainty(curve.uncertainty)
             for test in zip(*kept, strict=True)
-            for each, curve in zip(test, curves, strict=True)
+            for each, curve in zip(test, self.calibration.lasers, strict=True)
         ]
         limit = self.calibration.common_linearity
         return linearity_errors(effects, shares, limit, min(self.ranges), checks)

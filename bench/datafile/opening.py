@@ -63,7 +63,7 @@ WORDING = 11
 same version.
 """
 
-INTERVALS = 11
+INTERVALS = 12
 """Version of the evaluation of uncertainties, of the least and mean peak of an unsteady motion, and of the predicted
 intervals of its peaks. Replay compares them only with those of a file of the same version.
 """

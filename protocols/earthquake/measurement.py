@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.analysis.fall import FallWatch
+from bench.analysis.reading_correction import ReadingCorrection
 from bench.analysis.signals import ACCELERATION, DRIFT, U1
 from bench.analysis.transient_base import BaseMotion
 from bench.analysis.transient_peak import RunningPeak, running_peak
@@ -123,6 +124,7 @@ class GainMonitor:
 
     `bare` is the measured drift of the bare frame at the same samples, `noise` [m] the uncertainty of its peak, and
     `expected` are the predicted histories of the bare and the coupled frame, absent in the test of the bare frame.
+    `correction` is applied to each block.
     """
 
     def __init__(
@@ -133,14 +135,16 @@ class GainMonitor:
         bare: Array | None = None,
         noise: float = 0.0,
         expected: tuple[History, History] | None = None,
+        correction: ReadingCorrection | None = None,
     ) -> None:
         self._record, self._beta, self._rate = record, beta, sample_rate
-        self._peak = RunningPeak()
+        self._peak, self._correction = RunningPeak(), correction
         self._bare = None if bare is None else np.where((so_far := running_peak(bare)) > AUDIBLE * noise, so_far, nan)
         self._predicted = np.zeros(0) if expected is None else _running_gain(*expected)
 
     def __call__(self, signals: Array) -> RunningGain:
-        peak = self._peak.push(signals[:, DRIFT])
+        corrected = signals if self._correction is None else self._correction(signals)
+        peak = self._peak.push(corrected[:, DRIFT])
         seconds = self._peak.samples / self._rate
         bare = nan if self._bare is None else float(self._bare[min(self._peak.samples, self._bare.size) - 1])
         place = round(seconds / STEP)

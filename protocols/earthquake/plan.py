@@ -17,7 +17,8 @@ from math import tau
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.analysis.linearity import Checks
+from bench.analysis.error_curve import Checks
+from bench.analysis.reading_correction import ReadingCorrection
 from bench.analysis.signals import ACCELERATION, DRIFT
 from bench.config.model import BenchConfiguration
 from bench.control.replication import Replication, ReplicationParameters
@@ -129,7 +130,7 @@ class EarthquakePlan:
         self._targets, self._left_out = targets, left_out
         self._pace = Pace(parameters, shakings, table.duration, left_out, check)
         self._check = check
-        self._checks: Checks | None = None
+        self._correction = ReadingCorrection(configuration.sensors)
         self._bare: dict[str, BareTest | str] = {}
         self._shortfalls: dict[str, str] = {}
         self._points = 0
@@ -138,7 +139,8 @@ class EarthquakePlan:
         """Steps of the complete campaign."""
         model = yield from table_model(self._table, self._configuration, self._pace)
         if self._check is not None:
-            self._checks = yield from self._check_lasers(self._check, model)
+            checks = yield from self._check_lasers(self._check, model)
+            self._correction = ReadingCorrection(self._configuration.sensors.corrected_by(checks))
         for shaking in self._shakings:
             if (omitted := self._left_out.get((shaking.name, None))) is not None:
                 self._bare[shaking.name] = f"{OMITTED}: {omitted}"
@@ -263,7 +265,7 @@ class EarthquakePlan:
                 self._configuration,
                 p.draws,
                 seed,
-                self._checks,
+                self._correction.sensors,
             )
         signals = bare.signals[:0] if outcome.signals is None else outcome.signals
         return overturned_point(shaking, specimen, bare, signals, target, self._configuration, p.draws, seed)
@@ -272,7 +274,7 @@ class EarthquakePlan:
         """Evaluate the signals of a record. The zero from momentum has the errors of the lasers at all places of the
         motion: it is evaluated if the shapes of these errors were checked.
         """
-        frame = None if self._checks is None else linear_frame(self._configuration)
+        frame = linear_frame(self._configuration) if self._correction.sensors.checks else None
         return observe(signals, shaking.target.rest, shaking.target.sample_rate, frame)
 
     def _play(
@@ -285,7 +287,8 @@ class EarthquakePlan:
         outcome = yield Play(shaking.volts(drive, self._parameters.decay), monitor)
         ended = yield RampOut(fast=isinstance(outcome, Fallen))
         if isinstance(outcome, Played):
-            return Fallen(outcome.signals) if isinstance(ended, Fallen) else outcome
+            signals = self._correction(outcome.signals)
+            return Fallen(signals) if isinstance(ended, Fallen) else replace(outcome, signals=signals)
         if isinstance(outcome, Fallen):
             return outcome
         raise RigError("playing a drive returned no result")
@@ -296,7 +299,13 @@ class EarthquakePlan:
         expected = (History.of(specimen.bare(), base), History.of(specimen, base))
         noise = bare.observed.drift.peak.uncertainty
         return GainMonitor(
-            shaking.name, specimen.label, shaking.target.sample_rate, bare.signals[:, DRIFT], noise, expected
+            shaking.name,
+            specimen.label,
+            shaking.target.sample_rate,
+            bare.signals[:, DRIFT],
+            noise,
+            expected,
+            self._correction,
         )
 
     def _remarked(self, shaking: Shaking, point: EarthquakePoint) -> EarthquakePoint:

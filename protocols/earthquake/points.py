@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.analysis.linearity import Checks
+from bench.analysis.sensor_accuracy import SensorUncertainty
 from bench.analysis.transient_base import ALIKE
 from bench.config.model import BenchConfiguration
 from bench.control.passes import Pass
@@ -67,15 +67,12 @@ def measured_point(
     configuration: BenchConfiguration,
     draws: int,
     seed: int,
-    checks: Checks | None = None,
+    sensors: SensorUncertainty,
 ) -> EarthquakePoint:
-    """Point of a record without toppling, compared with the model under both achieved motions; `checks` are the result
-    of a check of the lasers.
-    """
-    sensors = configuration.sensors.checked_by(checks)
+    """Point of a record without toppling, compared with the model under both achieved motions."""
     reference, observed = with_better_zero(bare.observed, observed, sensors, draws, seed)
     bare = replace(bare, observed=reference)
-    found = compare(reference, observed, specimen, configuration, draws, seed, checks)
+    found = compare(reference, observed, specimen, configuration, draws, seed, sensors)
     moved = tracking(shaking, signals)
     return EarthquakePoint.model_validate(
         {

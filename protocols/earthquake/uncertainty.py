@@ -17,7 +17,6 @@ import numpy as np
 from numpy.random import SeedSequence
 from numpy.typing import NDArray
 
-from bench.analysis.linearity import Checks
 from bench.analysis.sensor_accuracy import Draws, PeakReadings, SensorUncertainty
 from bench.analysis.uncertainty import COVERAGE, NOISE, Budget
 from bench.config.model import BenchConfiguration
@@ -94,12 +93,12 @@ def compare(
     configuration: BenchConfiguration,
     n: int,
     seed: int,
-    checks: Checks | None = None,
+    checked: SensorUncertainty | None = None,
 ) -> Compared:
-    """Compare the gains measured in two tests, bare and coupled, with the predicted gains of `n` draws; `checks` are
-    the harmonics of the lasers' readings under a sine, if they were checked.
+    """Compare the gains measured in two tests, bare and coupled, with the predicted gains of `n` draws; `checked` are
+    the sensors of the `configuration` if the readings were corrected by a check.
     """
-    sensors = configuration.sensors.checked_by(checks)
+    sensors = configuration.sensors if checked is None else checked
     drifts, firsts = (bare.drift, coupled.drift), (bare.u1, coupled.u1)
     of_drift, of_u1, of_all, of_bench, of_parts = SeedSequence(seed).spawn(5)
     errors = drift_errors(drifts, sensors, n, of_drift)

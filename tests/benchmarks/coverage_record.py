@@ -9,6 +9,7 @@ import numpy as np
 
 from bench.accelerograms.reference import RecordReference
 from bench.analysis.linearity import LinearFrame
+from bench.analysis.reading_correction import ReadingCorrection
 from bench.analysis.sensor_accuracy import SensorUncertainty
 from bench.analysis.table_motion import table_motion, with_final_rest
 from bench.config.model import BenchConfiguration
@@ -94,8 +95,9 @@ def measured(seed: int, name: str, beta: float, case: Case, *, checked: bool = F
     if checked:
         check, moved = check_and_motion()
         checks = check.evaluate(sensors.signals(moved, found)[REST:], BenchConfiguration())
-    frame, accuracy = FRAME if checked else None, SensorUncertainty(ACCURACY, RANGES, found).checked_by(checks)
-    tests = [observe(sensors.signals(motion, found), REST, RATE, frame) for motion in (bare, coupled)]
+    frame, accuracy = FRAME if checked else None, SensorUncertainty(ACCURACY, RANGES, found).corrected_by(checks)
+    correction = ReadingCorrection(accuracy)
+    tests = [observe(correction(sensors.signals(motion, found)), REST, RATE, frame) for motion in (bare, coupled)]
     seen = [each.drift for each in with_better_zero(tests[0], tests[1], accuracy, DRAWS, seed)]
     drawn = drift_errors((seen[0], seen[1]), accuracy, DRAWS, seed)
     together = np.sum(list(drawn.values()), axis=0)

@@ -5,7 +5,8 @@ from math import tau
 import numpy as np
 import pytest
 
-from bench.analysis.linearity import SMOOTH, Effect, Harmonics, linearity_errors
+from bench.analysis.error_curve import Harmonics
+from bench.analysis.linearity import SMOOTH, Effect, linearity_errors
 
 LIMIT, WHOLE = 0.00016, 0.2
 PHASE = np.arange(64) * (tau / 64)

@@ -6,9 +6,9 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 
-from bench.analysis import linearity, remaining_transient, sensor_accuracy
+from bench.analysis import error_curve, remaining_transient, sensor_accuracy
+from bench.analysis.error_curve import Harmonics
 from bench.analysis.gain import SteadyPeak, gain
-from bench.analysis.linearity import Harmonics
 from bench.analysis.running_gain import CHANGED, RunningGain, shared_draws
 from bench.analysis.sensor_accuracy import PeakReadings, SensorAccuracy, SensorUncertainty
 
@@ -98,14 +98,14 @@ def test_a_campaign_of_many_frequencies_evaluates_its_checks_once_and_at_most_so
     """A sweep over 50 frequencies: a look takes milliseconds, and memory does not grow with their number squared."""
     bares = [checked(peak(0.01 + 0.0005 * k), 1.5) for k in range(50)]
     checks = tuple(each.checks for each in bares if each.checks is not None)
-    linearity._posterior.cache_clear()
+    error_curve.posterior.cache_clear()
     sizes = list[int]()
     for drift in (0.01, 0.02, 0.03):
         # the plan hands its sensors over anew at every look
         running = RunningGain(bares[-1], replace(SENSORS, checks=checks), SHARED)
         running.of(peak(drift))
-        sizes.append(linearity._posterior.cache_info().misses)
+        sizes.append(error_curve.posterior.cache_info().misses)
     assert sizes == [2, 2, 2], "both lasers once"
-    largest = linearity.widest([both[1] for both in checks])
-    assert [each.swing for each in largest] == [both[1].swing for both in checks[-linearity.MOST :]]
-    assert linearity.widest([both[0] for both in checks[:4]]) == [both[0] for both in checks[:4]]
+    largest = error_curve.widest([both[1] for both in checks])
+    assert [each.swing for each in largest] == [both[1].swing for both in checks[-error_curve.MOST :]]
+    assert error_curve.widest([both[0] for both in checks[:4]]) == [both[0] for both in checks[:4]]

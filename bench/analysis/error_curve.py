@@ -1,0 +1,174 @@
+"""Error curve of a laser as a random function of the reading, and what the harmonics of its readings tell about it.
+
+A data sheet states the largest linearity error over the measuring range, not its shape. The error is modelled as a
+function of the reading with the amplitude of the data sheet: either a Gaussian process with squared exponential
+covariance, for an irregular curve, or a sine of random phase. The number of waves over the range is unknown.
+
+The harmonics of the reading x(phase) of a linear frame that is driven by a sine are those of its error e(x(phase)): for
+a pure sine they are the Chebyshev coefficients of the curve over the swing. The posterior of the curve given the
+harmonics is that of Gaussian process regression (Rasmussen and Williams, 2006, section 2.2), for each number of waves,
+whose weight is their evidence (section 5.2). The amplitude is not estimated, since a small swing does not determine
+amplitude and number of waves separately.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from math import pi, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+FEWEST, NUMBERS = 0.25, 13
+WAVES: Array = np.array([FEWEST * 2.0 ** (0.5 * k) for k in range(NUMBERS)])
+"""Numbers of waves within the measuring range, from 0.25 to 16. A curve with fewer waves is a scale error, which the
+tests have in common; a curve with more waves is averaged over a swing. The numbers increase by a factor of sqrt(2), so
+that the exponent of the covariance doubles.
+"""
+
+ZETA_3 = 1.2020569
+"""zeta(3), the sum of 1 / m^3 over m = 1, 2, ..."""
+
+CAUTION = 0.3
+"""Factor applied to the logarithm of the evidence. It is below 1 because a true curve is not a draw from the process,
+and because the harmonics of a small swing hardly determine the number of waves.
+"""
+
+LEAST = 1e-5
+"""Smallest uncertainty of a harmonic, relative to the limit of the data sheet, so that exact harmonics can be
+evaluated.
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class Harmonics:
+    """Harmonics of the reading of one laser in a test of a linear frame.
+
+    `readings`, shape (n,) [m], over one period at equal steps of the phase, relative to the rest position; `found`,
+    shape (m,), complex [m], are the amplitudes c_k, from order 2 on, in signal = Re(sum of c_k exp(-i k phase));
+    `uncertainty`, shape (m,) [m], is the standard uncertainty of their real and imaginary parts.
+    """
+
+    readings: Array
+    found: NDArray[np.complex128]
+    uncertainty: Array
+    _enlarged: "dict[float, Harmonics]" = field(default_factory=lambda: _none(), init=False, repr=False)
+
+    @property
+    def swing(self) -> float:
+        """Span of the readings [m]."""
+        return float(np.ptp(self.readings))
+
+    def rounded(self, step: float) -> "Harmonics":
+        """The harmonics with the additional uncertainty due to the `step` [m] of the readings, at most that of one
+        rounding. Returns the same object for the same step.
+
+        The scatter of the cycles does not contain this uncertainty, since all cycles are rounded alike. By the sum in
+        `bench.analysis.rounding`, the mean square of the amplitude of one harmonic is zeta(3) q^3 / (pi^4 A) for a sine
+        of amplitude A, half of it in each part.
+        """
+        swing = max(0.5 * self.swing, step, np.finfo(np.float64).tiny)
+        rounding = min(sqrt(0.5 * ZETA_3 * step**3 / (pi**4 * swing)), step / sqrt(12.0))
+        return self.with_uncertainty(rounding)
+
+    def with_uncertainty(self, uncertainty: float) -> "Harmonics":
+        """The harmonics with an additional standard `uncertainty` [m] of each part. Returns the same object for the
+        same uncertainty, so that what is computed from it can be cached.
+        """
+        if uncertainty not in self._enlarged:
+            self._enlarged[uncertainty] = replace(self, uncertainty=np.hypot(self.uncertainty, uncertainty))
+        return self._enlarged[uncertainty]
+
+
+def _none() -> dict[float, Harmonics]:
+    return {}
+
+
+Checks = tuple[Harmonics, Harmonics]
+"""Harmonics of both lasers' readings in one test."""
+
+MOST = 8
+"""Largest number of tests whose harmonics are evaluated: the time grows with its third power, and further tests with
+smaller swings hardly contribute.
+"""
+
+
+def widest(checks: Sequence[Harmonics]) -> Sequence[Harmonics]:
+    """At most `MOST` of the checks, those with the widest swings, in their order."""
+    if len(checks) <= MOST:
+        return checks
+    kept = sorted(range(len(checks)), key=lambda k: checks[k].swing, reverse=True)[:MOST]
+    return [checks[k] for k in sorted(kept)]
+
+
+@dataclass(frozen=True, eq=False)
+class Posterior:
+    """Information from m measured harmonics about the error curve, for each of K candidates with different numbers of
+    waves. `whitening`, shape (K, m, m), transforms the harmonics to independent numbers of unit variance; `measured`,
+    shape (K, m), are the transformed harmonics; `likely`, shape (K,), is the weight of each candidate. `observed`,
+    shape (m, n), computes the harmonics of a curve from its values at the `places`, shape (n,).
+    """
+
+    places: Array
+    observed: Array
+    whitening: Array
+    measured: Array
+    likely: Array
+
+
+@lru_cache(maxsize=4)
+def posterior(checks: tuple[Harmonics, ...], limit: float, whole: float) -> Posterior:
+    places = np.concatenate([each.readings for each in checks])
+    observed = block_diagonal([_fourier(each.readings.size, each.found.size) for each in checks])
+    measured = np.concatenate([np.concatenate((each.found.real, each.found.imag)) for each in checks])
+    noise = np.diag(np.concatenate([np.tile(each.uncertainty, 2) for each in checks]) ** 2 + (LEAST * limit) ** 2)
+    factors = np.linalg.cholesky(0.5 * limit**2 * covariances(places, observed, places, observed, whole) + noise)
+    whitening = np.asarray(np.linalg.inv(factors), dtype=np.float64)
+    white = whitening @ measured
+    sizes = np.log(np.diagonal(factors, axis1=1, axis2=2)).sum(axis=1)
+    evidence = -0.5 * np.einsum("km,km->k", white, white) - sizes
+    likely = np.exp(CAUTION * (evidence - evidence.max()))
+    return Posterior(places, observed, whitening, white, likely / likely.sum())
+
+
+def covariances(one: Array, left: Array, other: Array, right: Array, whole: float) -> Array:
+    """Covariances of linear functions of the error curve, relative to its variance, shape (2 NUMBERS, l, r): the first
+    NUMBERS entries are for irregular curves, the others for sines. `left`, shape (l, n), applies to the values at the
+    places `one`, shape (n,), and `right`, shape (r, m), to those at `other`, shape (m,).
+    """
+    first = 2.0 * pi * FEWEST / whole
+    distances: Array = one[:, None] - other[None, :]
+    curve: Array = np.exp(-0.5 * (first * distances) ** 2)
+    found = np.empty((2 * NUMBERS, left.shape[0], right.shape[0]))
+    for k in range(NUMBERS):
+        # this order of products is faster, because `right` has fewer rows
+        found[k] = left @ (curve @ right.T)
+        curve *= curve
+    # covariance of a sine of random phase: the cosine of the phase difference
+    angles = 2.0 * pi / whole * WAVES
+    for part in (np.cos, np.sin):
+        near, far = part(np.outer(angles, one)) @ left.T, part(np.outer(angles, other)) @ right.T
+        sines = near[:, :, None] * far[:, None, :]
+        found[NUMBERS:] = sines if part is np.cos else found[NUMBERS:] + sines
+    return found
+
+
+def block_diagonal(blocks: Sequence[Array]) -> Array:
+    """Block-diagonal matrix of the given blocks."""
+    found = np.zeros((sum(len(each) for each in blocks), sum(each.shape[1] for each in blocks)))
+    top = left = 0
+    for each in blocks:
+        found[top : top + len(each), left : left + each.shape[1]] = each
+        top, left = top + len(each), left + each.shape[1]
+    return found
+
+
+@lru_cache(maxsize=8)
+def _fourier(points: int, orders: int) -> Array:
+    """Matrix, shape (2 * orders, points), from `points` values over one period to their cosine and sine coefficients,
+    from order 2 on.
+    """
+    angles = np.outer(np.arange(2, 2 + orders), np.arange(points) * (2.0 * pi / points))
+    return np.concatenate((np.cos(angles), np.sin(angles))) * (2.0 / points)
