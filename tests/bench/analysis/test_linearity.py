@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bench.analysis.error_curve import Harmonics
-from bench.analysis.linearity import SMOOTH, Effect, linearity_errors
+from bench.analysis.linearity import SMOOTH, Effect, expected_errors, linearity_errors
 
 LIMIT, WHOLE = 0.00016, 0.2
 PHASE = np.arange(64) * (tau / 64)
@@ -55,6 +55,39 @@ def test_harmonics_of_the_bare_frame_size_the_error(waves: float) -> None:
     assert np.mean(np.abs(off) <= 2.0) >= 0.95
     assert np.mean(sizes) < 0.95 * np.sqrt(SHARES @ worst.moments @ SHARES)
     assert (np.mean(numbers) > SMOOTH) == (waves > 2.0)
+
+
+@pytest.mark.parametrize("waves", [0.7, 1.5, 3.0, 4.0, 6.0])
+def test_corrected_readings_keep_a_small_part_of_the_error_and_its_uncertainty(waves: float) -> None:
+    effects, random = [peak(BARE), peak(COUPLED)], np.random.default_rng(5)
+    raw, left, sizes, bounds = [], [], [], []
+    for phase in np.arange(24) * (tau / 24):
+        checks = [check(waves, phase, random)]
+        raw.append(SHARES @ [each.weights @ curve(waves, phase, each.places) for each in effects])
+        expected = SHARES @ [each.weights @ expected_errors(each.places, LIMIT, WHOLE, checks) for each in effects]
+        left.append(raw[-1] - expected)
+        for found, corrected in ((sizes, True), (bounds, False)):
+            moments = linearity_errors(effects, SHARES, LIMIT, WHOLE, checks, corrected).moments
+            found.append(np.sqrt(SHARES @ moments @ SHARES))
+    assert np.sqrt(np.mean(np.square(left))) < 0.2 * np.sqrt(np.mean(np.square(raw)))
+    assert np.mean(sizes) < 0.5 * np.mean(bounds)
+    assert np.mean(np.abs(left) <= 2.0 * np.array(sizes)) >= 0.95
+
+
+def test_of_a_curve_found_by_its_harmonics_only_a_straight_line_is_unknown() -> None:
+    """Within the swing of the check, for waves that it resolves; the error at rest is subtracted."""
+    random, x = np.random.default_rng(3), np.linspace(-0.038, 0.038, 39)
+    straight = np.vander(x, 2)
+    for phase in np.arange(8) * (tau / 8):
+        found = expected_errors(np.append(x, 0.0), LIMIT, WHOLE, [check(3.0, phase, random)])
+        assert abs(found[-1]) < 1e-15
+        off = curve(3.0, phase, x) - found[:-1]
+        off -= straight @ np.linalg.lstsq(straight, off, rcond=None)[0]
+        assert np.std(off) < 0.03 * LIMIT
+
+
+def test_without_a_linearity_error_nothing_is_expected() -> None:
+    assert not expected_errors(BARE, 0.0, WHOLE, [check(1.5, 0.3, np.random.default_rng(1))]).any()
 
 
 def test_equal_motions_have_equal_errors() -> None:

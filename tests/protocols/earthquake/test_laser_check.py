@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from bench.analysis.reading_correction import ReadingCorrection
 from bench.analysis.signals import ACCELERATION, DRIFT, LASER_1, LASER_2, SIGNALS, U1
 from bench.app.cli.main import main
 from bench.config.model import BenchConfiguration
@@ -15,6 +16,7 @@ from bench.control.target import Reach
 from bench.datafile.reader import open_datafile
 from protocols.common.sine.settling import linear_frame
 from protocols.earthquake.laser_check import ABOVE, INSIDE, LaserCheck, laser_check
+from protocols.earthquake.measurement import GainMonitor
 from protocols.earthquake.observation import observe
 from protocols.earthquake.protocol import EarthquakeParameters
 from protocols.earthquake.uncertainty import CHOICE, drift_errors
@@ -143,6 +145,19 @@ def test_a_check_narrows_the_uncertainty_and_the_file_replays(
     capsys.readouterr()
     assert main(["replay", str(tmp_path / "checked" / "campaign.h5")]) == 0
     assert "Bit-identical to the file" in "".join(capsys.readouterr())
+
+
+def test_the_running_peak_is_that_of_the_corrected_drift() -> None:
+    check, error = check_of(), 1e-4
+    sensors = CONFIGURATION.sensors.corrected_by(check.evaluate(signals_of(check, error), CONFIGURATION))
+    correction, signals = ReadingCorrection(sensors), signals_of(check, error)[:5000]
+    monitor, peaks = GainMonitor("made", None, 1000.0, correction=correction), list[float]()
+    for block in np.split(signals, 10):
+        peaks.append(monitor(block).drift_peak)
+    true = np.abs(signals_of(check, 0.0)[:5000, DRIFT]).max()
+    assert peaks[-1] == pytest.approx(np.abs(correction(signals)[:, DRIFT]).max(), rel=1e-12)
+    uncorrected = np.abs(signals[:, DRIFT]).max()
+    assert abs(peaks[-1] - true) < 0.3 * abs(uncorrected - true)
 
 
 def test_another_peak_of_almost_the_same_size_adds_the_choice_between_them() -> None:
