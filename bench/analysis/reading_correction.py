@@ -40,15 +40,18 @@ class ReadingCorrection:
         if not self.sensors.corrected:
             return signals
         corrected = signals.copy()
-        errors = [
-            np.interp(signals[:, column], places, expected)
-            for column, (places, expected) in zip((LASER_1, LASER_2), self._curves, strict=True)
-        ]
+        errors = [self.expected(laser, signals[:, column]) for laser, column in enumerate((LASER_1, LASER_2))]
         corrected[:, LASER_1] -= errors[0]
         corrected[:, LASER_2] -= errors[1]
         corrected[:, U1] -= errors[0]
         corrected[:, DRIFT] -= errors[1] - errors[0]
         return corrected
+
+    def expected(self, laser: int, readings: Array) -> Array:
+        """Expected errors [m] of laser 0 or 1, shape (n,), which are subtracted from its `readings` [m]."""
+        if not self.sensors.corrected:
+            return np.zeros(readings.size)
+        return np.interp(readings, *self._curves[laser])
 
     @cached_property
     def _curves(self) -> Sequence[tuple[Array, Array]]:

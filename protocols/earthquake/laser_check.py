@@ -17,10 +17,12 @@ from bench.accelerograms.accelerogram import Accelerogram
 from bench.analysis.cycles import CycleAnalyser
 from bench.analysis.error_curve import Checks
 from bench.analysis.gain import steady_peak
+from bench.analysis.reading_correction import ReadingCorrection
 from bench.analysis.table_motion import table_motion
 from bench.config.model import BenchConfiguration
 from bench.control.preparation import PreparedMotion
 from bench.control.target import REST, Reach, Target, windowed
+from bench.events import Event, event
 from protocols.common.sine.settling import linear_frame
 from protocols.earthquake.protocol import EarthquakeParameters
 from protocols.earthquake.records import Shaking, band_used
@@ -52,6 +54,31 @@ MEASURED, FEWEST = 30, 12
 
 STEP = 0.005
 """Sample interval of the motion whose demands are simulated [s]."""
+
+
+@event(notice="lasers")
+class LasersChecked(Event):
+    """Result of the check of the lasers: span of each laser's readings in the check, and the largest `corrections`
+    within it [m], zero for calibrated lasers.
+    """
+
+    swings: tuple[float, float]
+    corrections: tuple[float, float]
+
+    @staticmethod
+    def of(correction: ReadingCorrection) -> "LasersChecked":
+        """The result of the check that the `correction` evaluates."""
+        ((first, second),) = correction.sensors.checks
+        largest = [float(np.abs(correction.expected(k, each.readings)).max()) for k, each in enumerate((first, second))]
+        return LasersChecked((first.swing, second.swing), (largest[0], largest[1]))
+
+    @property
+    def line(self) -> str:
+        spans, largest = (
+            " and ".join(f"{1e3 * each:.3g}" for each in pair) for pair in (self.swings, self.corrections)
+        )
+        found = f"corrected by up to {largest} mm" if any(self.corrections) else "not corrected"
+        return f"lasers checked over {spans} mm; their readings are {found}"
 
 
 @dataclass(frozen=True, eq=False)

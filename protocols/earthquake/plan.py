@@ -30,7 +30,7 @@ from drivers.rig import OperatorTask, RigError
 from protocols.common.identification.plan import identified
 from protocols.common.replicate import replicate, table_motion
 from protocols.common.sine.settling import linear_frame
-from protocols.earthquake.laser_check import LaserCheck
+from protocols.earthquake.laser_check import LaserCheck, LasersChecked
 from protocols.earthquake.measurement import GainMonitor, Histories, History, tracking
 from protocols.earthquake.observation import Observed, observe
 from protocols.earthquake.points import (
@@ -141,6 +141,8 @@ class EarthquakePlan:
         if self._check is not None:
             checks = yield from self._check_lasers(self._check, model)
             self._correction = ReadingCorrection(self._configuration.sensors.corrected_by(checks))
+            if checks is not None:
+                yield Publish(LasersChecked.of(self._correction))
         for shaking in self._shakings:
             if (omitted := self._left_out.get((shaking.name, None))) is not None:
                 self._bare[shaking.name] = f"{OMITTED}: {omitted}"

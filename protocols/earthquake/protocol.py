@@ -201,7 +201,7 @@ PROTOCOL = Protocol(
     parameters=EarthquakeParameters,
     point=EarthquakePoint,
     prepare=deferred("protocols.earthquake.campaign:EarthquakeCampaign"),
-    events=("protocols.common.replicate:PassFinished",),
+    events=("protocols.common.replicate:PassFinished", "protocols.earthquake.laser_check:LasersChecked"),
     figures=(
         "gain_curves.png",
         "table_motions.png",

@@ -173,12 +173,12 @@ def _protocols(protocols: Iterable[Protocol[Any]]) -> Iterator[str]:
 
 def _events(protocols: Sequence[Protocol[Any]]) -> Iterator[str]:
     yield _EVENTS
-    own = event_tables(kind for each in protocols for kind in each.event_types)
+    own = dict.fromkeys(kind for each in protocols for kind in each.event_types)
     members = [each for module in SHARED for each in vars(module).values()]
     modules = [module.__name__ for module in SHARED]
     events = [each for each in members if isinstance(each, type) and issubclass(each, Event) and each is not Event]
     kinds = [*dict.fromkeys(each for each in events if each.__module__ in modules), *own]
-    tables = {**EVENT_TABLES, **own}
+    tables = {**EVENT_TABLES, **event_tables(own)}
     links = {kind: f"[`{table.path}`](#entry{table.path.replace('/', '')})" for kind, table in tables.items()}
     rows = (
         (f"`{kind.__name__}`", "yes" if kind.journalled else "", links.get(kind, ""), _first_paragraph(kind))
