@@ -2,13 +2,11 @@
 
 Without further information about the error curve (`bench.analysis.error_curve`), the number of waves with the largest
 effect is assumed, for an irregular curve or a sine. Tests of the bare frame, which is linear and driven by a sine,
-check the lasers: the harmonics of the readings give each number of waves a weight, and a posterior of the curve.
+check the lasers: the harmonics of the readings give each number of waves a weight, and a posterior of the curve. The
+moments of the errors are then the weighted mean over the numbers of waves (law of total variance).
 
-If the readings are corrected, by the weighted mean of the posterior means (`expected_errors`), the remaining errors are
-the deviations from it, and their moments are the weighted mean over the numbers of waves (law of total variance). If
-they are not, the posterior mean is part of the uncertainty, as an uncorrected effect (GUM F.2.4.5), and of the numbers
-of waves that the checks do not exclude, the one with the largest effect is assumed: a bare frame that moves much less
-than the coupled one excludes few.
+Readings may be corrected by the weighted mean of the posterior means (`expected_errors`); the remaining errors are the
+deviations from it. If they are not, it is part of the uncertainty, as an uncorrected effect (GUM F.2.4.5).
 """
 
 from collections.abc import Sequence
@@ -28,9 +26,6 @@ SMOOTH = 1.5
 """Estimated number of waves above which a linearity error is not smooth. The estimate is 1.2 waves for a sine with 1.5
 periods over the range, and 1.9 for a sine with 3 periods.
 """
-
-PLAUSIBLE = 0.5
-"""Smallest weight of a number of waves, relative to the largest one, at which the checks do not exclude it."""
 
 ROUNDING = 1e-12
 """Fraction of a variance below which a remainder is due to rounding."""
@@ -100,10 +95,11 @@ def linearity_errors(
 ) -> LinearityErrors:
     """Errors of peaks measured by one laser with the measuring range `whole` [m] and the largest error `limit` [m].
 
-    `shares`, shape (tests,), are the derivatives of the result with respect to the peaks: they determine the most
-    unfavourable number of waves, of all or of those that `checks` do not exclude, which is then assumed; `waves` of the
-    result is the mean number according to the checks. With `corrected`, the errors are those of readings from which
-    `expected_errors` were subtracted. The evaluation of the checks is cached for later calls with the same objects.
+    `shares`, shape (tests,), are the derivatives of the result with respect to the peaks: without `checks` they
+    determine the most unfavourable number of waves, which is then assumed. With `checks`, `moments` and `waves` of the
+    result are means over all numbers, weighted by the evidence. With `corrected`, the errors are those of readings from
+    which `expected_errors` were subtracted. The evaluation of the checks is cached for later calls with the same
+    objects.
     """
     tests = len(effects)
     if limit == 0.0:
@@ -123,11 +119,7 @@ def linearity_errors(
         mean = mean - learned.likely @ mean
     moments = prior - white.transpose(0, 2, 1) @ white + mean[:, :, None] * mean[:, None, :]
     found = exp(float(learned.likely @ np.log(waves)))
-    if corrected:
-        return LinearityErrors(np.einsum("k,kij->ij", learned.likely, moments), found)
-    plausible = learned.likely >= PLAUSIBLE * learned.likely.max()
-    sizes = np.where(plausible, np.einsum("i,kij,j->k", shares, moments, shares), -1.0)
-    return LinearityErrors(moments[int(sizes.argmax())], found)
+    return LinearityErrors(np.einsum("k,kij->ij", learned.likely, moments), found)
 
 
 def expected_errors(places: Array, limit: float, whole: float, checks: Sequence[Harmonics]) -> Array:
