@@ -4,10 +4,11 @@ A data sheet states the largest linearity error over the measuring range, not it
 function of the reading with the amplitude of the data sheet: either a Gaussian process with squared exponential
 covariance, for an irregular curve, or a sine of random phase. The number of waves over the range is unknown.
 
-The harmonics of the reading x(phase) of a linear frame that is driven by a sine are those of its error e(x(phase)): for
-a pure sine they are the Chebyshev coefficients of the curve over the swing. The posterior of the curve given the
-harmonics is that of Gaussian process regression (Rasmussen and Williams, 2006, section 2.2), for each number of waves,
-whose weight is their evidence (section 5.2). The amplitude is not estimated, since a small swing does not determine
+The readings of a linear laser at a linear frame that is driven by a sine have no harmonics except the small ones caused
+by those of the table. The harmonics of a reading x(phase) are those of its error e(x(phase)): for a pure sine they are
+the Chebyshev coefficients of the curve over the swing. For each number of waves, the posterior of the curve given the
+harmonics is that of Gaussian process regression (Rasmussen and Williams, 2006, section 2.2); each is weighted by a
+power `CAUTION` of its evidence (section 5.2). The amplitude is not estimated, since a small swing does not determine
 amplitude and number of waves separately.
 """
 

@@ -1,9 +1,9 @@
 """Correction of the readings of checked lasers for their expected linearity errors.
 
 The harmonics of the bare frame tell the curvature of a laser's error curve over the swing of the check. The expected
-curve (`bench.analysis.linearity.expected_errors`) is near zero where the harmonics tell little; the rest of the error
-is part of the uncertainty of `SensorUncertainty.corrected_by` the same checks. A change of scale causes no harmonics:
-it is neither found nor corrected.
+error (`bench.analysis.linearity.expected_errors`) tends to a constant far outside the swing, minus the expected error
+at rest; the rest of the error is part of the uncertainty of `SensorUncertainty.corrected_by` the same checks. A change
+of scale causes no harmonics: it is neither found nor corrected.
 """
 
 from collections.abc import Sequence

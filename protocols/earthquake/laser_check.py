@@ -2,9 +2,9 @@
 lasers were linear.
 
 Under a record, the readings alone do not tell the shape of a laser's linearity error, so that the most unfavourable
-number of waves within the measuring range is assumed. The harmonics under a sine tell which numbers are possible
-(`bench.analysis.linearity`). Between the modes of the frame, a table motion of a few centimetres moves both storeys as
-far as a strong record does.
+number of waves within the measuring range is assumed. The harmonics under a sine tell which numbers are possible, and
+the readings are corrected for the expected error (`bench.analysis.reading_correction`). Between the modes of the frame,
+a table motion of a few centimetres moves the second storey as far as a strong record does.
 """
 
 from dataclasses import dataclass
@@ -77,7 +77,7 @@ class LasersChecked(Event):
         spans, largest = (
             " and ".join(f"{1e3 * each:.3g}" for each in pair) for pair in (self.swings, self.corrections)
         )
-        found = f"corrected by up to {largest} mm" if any(self.corrections) else "not corrected"
+        found = f"corrected by up to {largest} mm there" if any(self.corrections) else "not corrected"
         return f"lasers checked over {spans} mm; their readings are {found}"
 
 

@@ -165,7 +165,7 @@ class EarthquakePlan:
                 raise RigError(NO_BLOCK)
             found = check.evaluate(outcome.signals, self._configuration)
         except InvalidInput as refused:
-            yield Publish(Warned(f"the lasers are not checked, and the uncertainty of alpha_2 is larger: {refused}"))
+            yield Publish(Warned(f"the lasers are not checked, and alpha_2 is less accurate: {refused}"))
             found = None
         self._pace.played(shaking.name)
         yield Publish(self._pace.progress(f"{shaking.name} finished"))
@@ -194,7 +194,7 @@ class EarthquakePlan:
             self._shortfalls[shaking.name] = lacking
             yield Publish(Warned(f"{shaking.name} is played with the best drive so far: {lacking}"))
         yield Publish(StepStarted(f"{shaking.name}, bare frame"))
-        monitor = GainMonitor(shaking.name, None, shaking.target.sample_rate)
+        monitor = GainMonitor(shaking.name, None, shaking.target.sample_rate, correction=self._correction)
         outcome = yield from self._play(shaking, replication.drive, monitor)
         if not isinstance(outcome, Played):
             raise RigError(NO_BLOCK)
@@ -288,9 +288,10 @@ class EarthquakePlan:
         yield Arm(self._parameters.rest)
         outcome = yield Play(shaking.volts(drive, self._parameters.decay), monitor)
         ended = yield RampOut(fast=isinstance(outcome, Fallen))
+        if isinstance(outcome, Played | Fallen) and outcome.signals is not None:
+            outcome = replace(outcome, signals=self._correction(outcome.signals))
         if isinstance(outcome, Played):
-            signals = self._correction(outcome.signals)
-            return Fallen(signals) if isinstance(ended, Fallen) else replace(outcome, signals=signals)
+            return Fallen(outcome.signals) if isinstance(ended, Fallen) else outcome
         if isinstance(outcome, Fallen):
             return outcome
         raise RigError("playing a drive returned no result")

@@ -85,8 +85,8 @@ class EarthquakeParameters(Parameters):
     laser_check: bool = quantity(
         False,
         "",
-        "whether a sine of the bare frame checks the linearity of the lasers before the records, which narrows the "
-        "uncertainty of alpha_2",
+        "whether a sine of the bare frame checks the linearity of the lasers before the records; readings are then "
+        "corrected, and alpha_2 has a smaller uncertainty",
     )
     draws: int = quantity(
         200,

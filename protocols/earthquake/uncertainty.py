@@ -96,7 +96,7 @@ def compare(
     checked: SensorUncertainty | None = None,
 ) -> Compared:
     """Compare the gains measured in two tests, bare and coupled, with the predicted gains of `n` draws; `checked` are
-    the sensors of the `configuration` if the readings were corrected by a check.
+    the sensors of the `configuration` with the check of the lasers, if there was one.
     """
     sensors = configuration.sensors if checked is None else checked
     drifts, firsts = (bare.drift, coupled.drift), (bare.u1, coupled.u1)

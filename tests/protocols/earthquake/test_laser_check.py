@@ -1,6 +1,7 @@
 """The check of the lasers before the records: its sine, and the uncertainty of alpha_2 with and without it."""
 
 import json
+from dataclasses import replace
 from math import tau
 from pathlib import Path
 from typing import Any
@@ -14,14 +15,16 @@ from bench.app.cli.main import main
 from bench.config.model import BenchConfiguration
 from bench.control.target import Reach
 from bench.datafile.reader import open_datafile
+from bench.live_values import RunningGain
 from protocols.common.sine.settling import linear_frame
-from protocols.earthquake.laser_check import ABOVE, INSIDE, LaserCheck, laser_check
+from protocols.earthquake.laser_check import ABOVE, INSIDE, NAME, LaserCheck, LasersChecked, laser_check
 from protocols.earthquake.measurement import GainMonitor
 from protocols.earthquake.observation import observe
 from protocols.earthquake.protocol import EarthquakeParameters
 from protocols.earthquake.uncertainty import CHOICE, drift_errors
 from sim.errors import InvalidInput
 from sim.linear import steady_response
+from tests.bench.calibrated import calibration
 from tests.protocols.earthquake.test_campaign import bench as bench
 
 CONFIGURATION = BenchConfiguration()
@@ -142,9 +145,30 @@ def test_a_check_narrows_the_uncertainty_and_the_file_replays(
     assert checked["agrees"] is True
     assert checked["alpha_2"] == pytest.approx(without["alpha_2"], rel=0.005)
     assert checked["alpha_2_uncertainty"] < 0.4 * without["alpha_2_uncertainty"]
+    with open_datafile(tmp_path / "checked" / "campaign.h5") as record:
+        (said,) = [event.text for event in record.events if event.kind == "LasersChecked"]
+        running = [row for row in record.rows_of(RunningGain) if row["record"] != NAME]
+    assert "corrected by up to" in said
+    # the largest corrected sample, and the peak fitted to the corrected samples, with another zero
+    for beta, peak in ((None, checked["bare_drift_peak_m"]), (0.25, checked["drift_peak_m"])):
+        largest = max(row["drift_peak"] for row in running if row["beta"] == beta)
+        assert largest == pytest.approx(peak, rel=0.005)
     capsys.readouterr()
     assert main(["replay", str(tmp_path / "checked" / "campaign.h5")]) == 0
     assert "Bit-identical to the file" in "".join(capsys.readouterr())
+
+
+def test_the_journal_states_the_correction() -> None:
+    check = check_of()
+    checks = check.evaluate(signals_of(check, 1e-4), CONFIGURATION)
+    said = LasersChecked.of(ReadingCorrection(CONFIGURATION.sensors.corrected_by(checks)))
+    assert said.swings == (checks[0].swing, checks[1].swing)
+    # a parabola: its largest error is at the ends of the swing, apart from the slope, which harmonics do not tell
+    assert said.corrections[0] == pytest.approx(1e-4, rel=0.3)
+    assert said.corrections[1] < 1e-6
+    assert "corrected by up to" in said.line
+    calibrated = replace(CONFIGURATION.sensors, calibration=calibration(-0.1, 0.1)).corrected_by(checks)
+    assert LasersChecked.of(ReadingCorrection(calibrated)).line.endswith("their readings are not corrected")
 
 
 def test_the_running_peak_is_that_of_the_corrected_drift() -> None:
