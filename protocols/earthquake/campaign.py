@@ -18,7 +18,7 @@ from bench.prediction.statements import ABOUT
 from bench.preflight.margins import Forecast
 from bench.protocol import Plan, Prepared, Result, Sources
 from protocols.earthquake.forecast import Combination, beyond_limits, combinations, forecast
-from protocols.earthquake.laser_check import laser_check
+from protocols.earthquake.laser_check import advice, laser_check
 from protocols.earthquake.measurement import STEP, Histories
 from protocols.earthquake.plan import EarthquakePlan
 from protocols.earthquake.protocol import EarthquakeParameters, PointStatus
@@ -110,9 +110,10 @@ class EarthquakeCampaign(Prepared[EarthquakeParameters]):
             ]
             write_figure(path, drift_figure(shown))
 
+        recommended = "\n".join(textwrap.wrap(advice(self.parameters, self.configuration, plain(points)), WIDTH))
         return Result(
             points=tuple(points),
-            text=f"{earthquake_table(points)}\n\n{statement_text(statement)}",
+            text="\n\n".join(filter(None, (earthquake_table(points), recommended, statement_text(statement)))),
             figures={"gain_curves.png": gains, "table_motions.png": motions, "drift_histories.png": drifts},
             findings={"records": [shaking.described() for shaking in self.shakings], "statement": statement},
         )

@@ -7,8 +7,11 @@ the readings are corrected for the expected error (`bench.analysis.reading_corre
 a table motion of a few centimetres moves the second storey as far as a strong record does.
 """
 
+import json
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import tau
+from math import sqrt, tau
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +21,9 @@ from bench.analysis.cycles import CycleAnalyser
 from bench.analysis.error_curve import Checks
 from bench.analysis.gain import steady_peak
 from bench.analysis.reading_correction import ReadingCorrection
+from bench.analysis.sensor_accuracy import LINEARITY
 from bench.analysis.table_motion import table_motion
+from bench.analysis.uncertainty import COVERAGE
 from bench.config.model import BenchConfiguration
 from bench.control.preparation import PreparedMotion
 from bench.control.target import REST, Reach, Target, windowed
@@ -51,6 +56,11 @@ vibration, whose decay has harmonics of its own, would be 2.5 times as large.
 
 MEASURED, FEWEST = 30, 12
 """Number of evaluated cycles, and smallest number of them without missing samples."""
+
+MOSTLY = sqrt(0.5)
+"""Smallest share of the uncertainty of alpha_2 for which the linearity of the lasers is said to dominate it: half of
+the variance.
+"""
 
 STEP = 0.005
 """Sample interval of the motion whose demands are simulated [s]."""
@@ -108,6 +118,28 @@ class LaserCheck:
         found = steady_peak(cycles, self.omega, frame=linear_frame(configuration)).checks
         assert found is not None
         return found
+
+
+def advice(
+    parameters: EarthquakeParameters, configuration: BenchConfiguration, points: Sequence[Mapping[str, Any]]
+) -> str:
+    """Sentence that recommends the check; empty if the lasers were checked or calibrated, or if their linearity does
+    not dominate the uncertainty of alpha_2 at any of the `points`, which have the fields of the results.
+    """
+    if parameters.laser_check or configuration.calibrated is not None:
+        return ""
+    measured = [row for row in points if row["alpha_2_uncertainty"] and row.get("uncertainty_parts")]
+    number = sum(
+        COVERAGE * json.loads(row["uncertainty_parts"]).get(LINEARITY, 0.0) > MOSTLY * row["alpha_2_uncertainty"]
+        for row in measured
+    )
+    if number == 0:
+        return ""
+    return (
+        f"The linearity of the lasers dominates {number} of {len(measured)} uncertainties of the measured alpha_2: "
+        "--laser-check measures it before the records, which takes one and a half minutes and usually reduces these "
+        "uncertainties to a tenth."
+    )
 
 
 def laser_check(parameters: EarthquakeParameters, configuration: BenchConfiguration) -> LaserCheck | None:

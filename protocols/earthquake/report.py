@@ -22,6 +22,7 @@ from bench.figures.earthquake_figure import DriftPicture, MotionPicture, drift_f
 from bench.live_values import RunningGain
 from protocols.common.budgets import budget_parts, budgeted
 from protocols.earthquake.campaign import check_statement
+from protocols.earthquake.laser_check import advice
 from protocols.earthquake.measurement import STEP, History
 from protocols.earthquake.observation import observe
 from protocols.earthquake.protocol import EarthquakeParameters
@@ -55,6 +56,7 @@ def seismic_sections(campaign: Campaign) -> list[Section]:
             ],
         ),
     ]
+    parts += _advice(campaign, points)
     table = campaign.record.tables.get("prediction", {})
     if {"record", "beta", "alpha_2"} <= table.keys():
         parts.append(
@@ -71,6 +73,13 @@ def seismic_sections(campaign: Campaign) -> list[Section]:
         parts += ["Remarks on single tests:", Listing(remarks)]
     parts += histories_parts(campaign)
     return [Section("seismic", "Earthquake records (as in Figs. 7 to 9 of the paper)", parts)]
+
+
+def _advice(campaign: Campaign, points: Sequence[Mapping[str, Any]]) -> list[Part]:
+    if campaign.configuration is None:
+        return []
+    found = advice(validated(EarthquakeParameters, campaign.parameters), campaign.configuration, points)
+    return [typeset(found)] if found else []
 
 
 def _gains(points: Sequence[Mapping[str, Any]]) -> Table:

@@ -10,17 +10,21 @@ import numpy as np
 import pytest
 
 from bench.analysis.reading_correction import ReadingCorrection
+from bench.analysis.sensor_accuracy import LINEARITY
 from bench.analysis.signals import ACCELERATION, DRIFT, LASER_1, LASER_2, SIGNALS, U1
 from bench.app.cli.main import main
 from bench.config.model import BenchConfiguration
 from bench.control.target import Reach
 from bench.datafile.reader import open_datafile
+from bench.document.campaign import Campaign
+from bench.document.document import Section
 from bench.live_values import RunningGain
 from protocols.common.sine.settling import linear_frame
-from protocols.earthquake.laser_check import ABOVE, INSIDE, NAME, LaserCheck, LasersChecked, laser_check
+from protocols.earthquake.laser_check import ABOVE, INSIDE, NAME, LaserCheck, LasersChecked, advice, laser_check
 from protocols.earthquake.measurement import GainMonitor
 from protocols.earthquake.observation import observe
 from protocols.earthquake.protocol import EarthquakeParameters
+from protocols.earthquake.report import seismic_sections
 from protocols.earthquake.uncertainty import CHOICE, drift_errors
 from sim.errors import InvalidInput
 from sim.linear import steady_response
@@ -38,6 +42,18 @@ def check_of(**parameters: Any) -> LaserCheck:
 
 def test_no_check_is_made_unless_it_is_requested() -> None:
     assert laser_check(EarthquakeParameters(), CONFIGURATION) is None
+
+
+def test_the_check_is_recommended_where_the_linearity_of_the_lasers_dominates() -> None:
+    def point(linearity: float) -> dict[str, Any]:
+        return {"alpha_2_uncertainty": 0.02, "uncertainty_parts": json.dumps({LINEARITY: linearity, CHOICE: 0.001})}
+
+    points = [point(0.0099), point(0.005), point(0.008), {"alpha_2_uncertainty": None, "uncertainty_parts": ""}]
+    assert "2 of 3" in advice(EarthquakeParameters(), CONFIGURATION, points)
+    calibrated = CONFIGURATION.model_copy(update={"calibrated": calibration(-0.05, 0.05)})
+    assert advice(EarthquakeParameters(), CONFIGURATION, points[1:2]) == ""
+    assert advice(EarthquakeParameters(laser_check=True), CONFIGURATION, points) == ""
+    assert advice(EarthquakeParameters(), calibrated, points) == ""
 
 
 def test_the_sine_uses_most_of_a_limit_and_exceeds_none() -> None:
@@ -145,6 +161,12 @@ def test_a_check_narrows_the_uncertainty_and_the_file_replays(
     assert checked["agrees"] is True
     assert checked["alpha_2"] == pytest.approx(without["alpha_2"], rel=0.005)
     assert checked["alpha_2_uncertainty"] < 0.4 * without["alpha_2_uncertainty"]
+    recommended: list[bool] = []
+    for name in ("without", "checked"):
+        with open_datafile(path := tmp_path / name / "campaign.h5") as record:
+            (section,) = seismic_sections(Campaign(path, record))
+        recommended.append(any("1 of 1" in part and "--laser-check" in part for part in texts(section)))
+    assert recommended == [True, False]
     with open_datafile(tmp_path / "checked" / "campaign.h5") as record:
         (said,) = [event.text for event in record.events if event.kind == "LasersChecked"]
         running = [row for row in record.rows_of(RunningGain) if row["record"] != NAME]
@@ -156,6 +178,10 @@ def test_a_check_narrows_the_uncertainty_and_the_file_replays(
     capsys.readouterr()
     assert main(["replay", str(tmp_path / "checked" / "campaign.h5")]) == 0
     assert "Bit-identical to the file" in "".join(capsys.readouterr())
+
+
+def texts(section: Section) -> list[str]:
+    return [part for part in section.parts if isinstance(part, str)]
 
 
 def test_the_journal_states_the_correction() -> None:
