@@ -2,6 +2,7 @@
 
 import json
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -17,7 +18,6 @@ from protocols.earthquake.laser_check import LaserCheck, laser_check
 from protocols.earthquake.observation import observe
 from protocols.earthquake.protocol import EarthquakeParameters
 from protocols.earthquake.uncertainty import drift_errors, with_better_zero
-from protocols.harmonic.protocol import HarmonicParameters
 from sim.excitation import SampledRecord
 from sim.rocking import simulate
 from sim.specimen import Specimen
@@ -113,11 +113,18 @@ def _scatter(errors: Array) -> float:
     return float(np.std((1.0 + errors[1]) / (1.0 + errors[0])))
 
 
-def seismic(trials: int, name: str) -> None:
-    for case in (CASES["default"], CASES["calibrated"]):
-        print("\nwith a calibration" if case.calibrated else "\nby the data sheets alone")
-        for beta in HarmonicParameters().beta:
-            rows = [measured(seed, name, beta, case) for seed in range(trials)]
+def seismic(
+    trials: int, name: str, betas: Sequence[float], periods: Sequence[float] = (), *, checked: bool = False
+) -> None:
+    """Print the coverage under the record `name` at each stiffness ratio, with default lasers and after a calibration.
+    With `periods`, of lasers with these numbers of periods in their linearity error; `checked` with the check of the
+    lasers.
+    """
+    cases = [Case(f"{each:g} periods", waves=(each, each)) for each in periods]
+    for case in cases or [CASES["default"], *([] if checked else [CASES["calibrated"]])]:
+        print(f"\n{case.name}")
+        for beta in betas:
+            rows = [measured(seed, name, beta, case, checked=checked) for seed in range(trials)]
             largest = Counter(max(row.parts, key=lambda part: row.parts[part]) for row in rows)
             found = Statistics.of([row.estimate for row in rows])
             print(
@@ -131,5 +138,6 @@ def seismic(trials: int, name: str) -> None:
                         "rms error/u": round(found.rms, 2),
                         "held": round(found.covered, 3),
                     }
-                )
+                ),
+                flush=True,
             )
