@@ -255,7 +255,7 @@ class SineDrive:
         output.source.require_silence("a dwell")
         if self._cycles is None or step.phase is not None:
             first = output.read if step.phase is None else self._sample_at(step.phase)
-            self._cycles = CycleAnalyser(output.source.oscillator.omega, self._rate, first)
+            self._cycles = CycleAnalyser(output.source.oscillator.omega, self._rate, first, step.harmonics)
         done: list[Cycle] = []
         missing = Counter[tuple[int, int]]()
         end = self._cycles.completed + step.cycles

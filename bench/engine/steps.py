@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.analysis.cycles import Cycle
+from bench.analysis.cycles import HARMONICS, Cycle
 from bench.control.oscillator import DriveCalibration, Segment
 from bench.events import Event
 from bench.guard.limits import Violation
@@ -74,11 +74,12 @@ class Dwell:
     """Hold amplitude and frequency for `cycles` full cycles. Returns `Measured`, or `Fallen`.
 
     The count of cycles continues that of the previous dwell. If `phase` [rad] is given, the count restarts, and each
-    cycle begins at this phase of the oscillator.
+    cycle begins at this phase of the oscillator. `harmonics` is the number of fitted harmonics of a count that begins.
     """
 
     cycles: int
     phase: float | None = None
+    harmonics: int = HARMONICS
 
 
 @dataclass(frozen=True)

@@ -37,8 +37,11 @@ from protocols.common.calibrate import Unmeasurable
 
 Array = NDArray[np.float64]
 
-HIGHEST = 9
-"""Highest order of the fit; cycles with ten harmonics contain little information about higher orders."""
+HIGHEST = 20
+"""Highest order of the fit, sufficient for an error with six periods within the measuring range over half of it."""
+
+HARMONICS = HIGHEST + 1
+"""Number of harmonics fitted to the cycles: the order k of an error shows in the harmonics up to about k."""
 
 READINGS = 201
 """Number of readings at which curves are compared."""
@@ -56,13 +59,15 @@ class Pass:
     lasers: tuple[Array, Array]
     ratio: float
     """Ratio of the table's displacement amplitude to the amplitude computed from its acceleration, a / omega^2."""
+    harmonics: int = HARMONICS
+    """Number of harmonics fitted to the cycles, fewer with a low sample rate."""
 
 
 @dataclass(frozen=True, eq=False)
 class ErrorCurve:
     """Error curve of one laser relative to the measured table displacement: Chebyshev coefficients `error` [m] over the
-    readings from `low` to `high` [m], and `delay` [s]. `scores` [m], shape (HIGHEST,), are the rms prediction errors of
-    the orders 1 to HIGHEST; `residual` [m] is the rms contribution of higher orders. `without` [m], shape (passes,
+    readings from `low` to `high` [m], and `delay` [s]. `scores` [m], shape (orders,), are the rms prediction errors of
+    the orders from 1 on; `residual` [m] is the rms contribution of higher orders. `without` [m], shape (passes,
     READINGS), are the curves, and `delays` [s], shape (passes,), the delays, fitted without each pass in turn.
     """
 
@@ -110,6 +115,7 @@ def mean_pass(cycles: Sequence[Cycle], omega: float) -> Pass:
         speed=omega * waves.rates[:, DISPLACEMENT],
         lasers=(waves.waveform[:, LASER_1], waves.waveform[:, LASER_2]),
         ratio=float(abs(moved[DISPLACEMENT]) * omega**2 / abs(moved[ACCELERATION])),
+        harmonics=min((cycle.coefficients.shape[0] - 1) // 2 for cycle in cycles),
     )
 
 
@@ -118,7 +124,8 @@ def fit_curve(passes: Sequence[Pass], laser: int, rest: float) -> ErrorCurve:
     readings = [rest + each.lasers[laser] for each in passes]
     # the range that all passes cover
     low, high = max(float(r.min()) for r in readings), min(float(r.max()) for r in readings)
-    rows = [_columns(r, each, low, high) for r, each in zip(readings, passes, strict=True)]
+    highest = max(min(HIGHEST, min(each.harmonics for each in passes) - 1), 1)
+    rows = [_columns(r, each, low, high, highest) for r, each in zip(readings, passes, strict=True)]
     errors = [r - each.displacement for r, each in zip(readings, passes, strict=True)]
     every = range(len(passes))
 
@@ -135,12 +142,12 @@ def fit_curve(passes: Sequence[Pass], laser: int, rest: float) -> ErrorCurve:
         # the variance excludes the mean, since quantisation shifts the zero differently in each pass
         return float(np.var(wrong))
 
-    squares: Array = np.array([[missed(order, out) for out in every] for order in range(1, HIGHEST + 1)])
+    squares: Array = np.array([[missed(order, out) for out in every] for order in range(1, highest + 1)])
     means = squares.mean(axis=1)
     best = int(means.argmin())
     allowed = means[best] + float(np.std(squares[best], ddof=1)) / sqrt(len(passes))
     order = int(np.flatnonzero(means <= allowed)[0]) + 1
-    whole, finest = solved(order), solved(HIGHEST)
+    whole, finest = solved(order), solved(highest)
     alone: Array = np.array([solved(order, out) for out in every])
     at = np.linspace(-1.0, 1.0, READINGS)
     return ErrorCurve(
@@ -285,10 +292,10 @@ def _rescaled(curve: ErrorCurve, factor: float) -> Array:
     return error
 
 
-def _columns(readings: Array, each: Pass, low: float, high: float) -> Array:
-    """Columns of the fit, shape (k, HIGHEST + 3): Chebyshev polynomials up to order HIGHEST, delay, and compliance of
-    the clamps.
+def _columns(readings: Array, each: Pass, low: float, high: float, highest: int) -> Array:
+    """Columns of the fit, shape (k, highest + 3): Chebyshev polynomials up to the order `highest`, delay, and
+    compliance of the clamps.
     """
     place = (2.0 * readings - high - low) / (high - low)
-    columns = (chebyshev.chebvander(place, HIGHEST), -each.speed, each.omega**2 * each.displacement)
+    columns = (chebyshev.chebvander(place, highest), -each.speed, each.omega**2 * each.displacement)
     return np.column_stack(columns).astype(np.float64)

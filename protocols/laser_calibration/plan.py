@@ -24,7 +24,15 @@ from bench.engine.steps import (
 )
 from bench.events import Progress, StepStarted
 from protocols.common.calibrate import SETTLING, Unmeasurable, calibrate_drive, complete_cycles, probed_drive
-from protocols.laser_calibration.fit import ErrorCurve, Pass, calibration, fit_curve, mean_pass, require_agreement
+from protocols.laser_calibration.fit import (
+    HARMONICS,
+    ErrorCurve,
+    Pass,
+    calibration,
+    fit_curve,
+    mean_pass,
+    require_agreement,
+)
 from protocols.laser_calibration.protocol import LaserCalibrationParameters
 from sim.channel import STOREYS
 
@@ -129,7 +137,7 @@ def _passes(parameters: LaserCalibrationParameters) -> Generator[Step, Outcome, 
             if passes:
                 yield Sweep((Segment(START, 0.0, passes[-1].omega),))
             yield Sweep((Segment(START, amplitude * omega**2, omega),))
-        outcome = yield Dwell(SETTLING + parameters.cycles)
+        outcome = yield Dwell(SETTLING + parameters.cycles, harmonics=HARMONICS)
         if not isinstance(outcome, Measured):
             raise Unmeasurable(_LOOSE)
         passes.append(mean_pass(complete_cycles(outcome, parameters.cycles), omega))

@@ -7,6 +7,7 @@ from math import degrees
 
 from bench.analysis.free_decay.response import NAMES
 from tests.benchmarks import (
+    calibrated_lasers,
     check_delays,
     coverage,
     coverage_record,
@@ -171,6 +172,17 @@ def studies() -> dict[str, Study]:
             table_response.responses,
             1.8,
             {table_response.keys(place)[1]: ("mrad", 1e3) for place in table_response.PLACES},
+        ),
+        *(
+            Study(
+                f"laser-calibration, {case}",
+                f"`laser-calibration`, {HARMONIC[case][0]}",
+                calibrated_lasers.NAMES,
+                partial(calibrated_lasers.calibrated, case=case),
+                1.3,
+                {"curve": ("µm", 1e6)},
+            )
+            for case in ("default", "smooth", "short waves")
         ),
         Study("check", "`check`, lasers at 4 kHz", CHECK, check_delays.delays, 0.8, dict.fromkeys(CHECK, ("µs", 1e6))),
     ]

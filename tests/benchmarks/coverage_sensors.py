@@ -8,11 +8,12 @@ import numpy as np
 from numpy.random import SeedSequence
 from numpy.typing import NDArray
 
+from bench.analysis.cycles import HARMONICS as OF_SINES
 from bench.analysis.cycles import Cycle, CycleAnalyser
 from bench.analysis.laser_calibration import LaserCalibration
 from bench.analysis.sensor_accuracy import SensorAccuracy
 from bench.analysis.signals import SignalMap
-from protocols.laser_calibration.fit import calibration, fit_curve, mean_pass
+from protocols.laser_calibration.fit import HARMONICS, calibration, fit_curve, mean_pass
 from protocols.laser_calibration.plan import planned_passes
 from protocols.laser_calibration.protocol import LaserCalibrationParameters
 from sim.excitation import SampledRecord
@@ -169,7 +170,8 @@ class Sensors:
             t = np.arange(round((asked.cycles + 2) * tau / omega * RATE)) / RATE
             x, v, a = (amplitude * omega**k * np.sin(omega * t + 0.5 * k * np.pi) for k in range(3))
             zero = np.zeros(t.size)
-            cycles = cycles_of(self.signals(Motion(x, v, a, zero, zero, zero, zero), None), omega)
+            signals = self.signals(Motion(x, v, a, zero, zero, zero, zero), None)
+            cycles = cycles_of(signals, omega, HARMONICS)
             passes.append(mean_pass(cycles, omega))
         rests = float(self.rest[0]), float(self.rest[1])
         return calibration(
@@ -184,23 +186,21 @@ class Sensors:
             date=datetime.now(UTC),
         )
 
-    def error_between(self, number: int, curve: LaserCalibration, span: float) -> float:
-        """Relative error of the corrected span of laser 0 or 1 over +-span/2 [m] about its rest."""
-        laser, found = self.lasers[number], curve.lasers[number]
+    def reading(self, number: int, displacement: Array) -> Array:
+        """Readings of laser 0 or 1 at `displacement` [m] from rest, relative to mid range, without noise and steps."""
+        laser, x = self.lasers[number], displacement + self.rest[number]
         phase = float(laser.stream(RATE, self.seeds[number])._constants[4])
-        x = np.array([-0.5, 0.5]) * span + self.rest[number]
-        whole = laser.measuring_range
-        shown = x * (1.0 + laser.scale_error)
-        shown += whole * laser.linearity * np.sin(tau * laser.linearity_periods * x / whole + phase)
-        return float(np.diff(found.corrected(shown))[0] / span)
+        turns = tau * laser.linearity_periods * x / laser.measuring_range
+        return x * (1.0 + laser.scale_error) + laser.measuring_range * laser.linearity * np.sin(turns + phase)
 
 
 def rms(values: list[float] | Array) -> float:
     return float(np.sqrt(np.mean(np.square(values))))
 
 
-def cycles_of(signals: Array, omega: float) -> list[Cycle]:
-    return CycleAnalyser(omega, RATE, REST + LEAD).push(np.column_stack((signals, signals[:, 0]))[REST + LEAD :])
+def cycles_of(signals: Array, omega: float, harmonics: int = OF_SINES) -> list[Cycle]:
+    analyser = CycleAnalyser(omega, RATE, REST + LEAD, harmonics)
+    return analyser.push(np.column_stack((signals, signals[:, 0]))[REST + LEAD :])
 
 
 ODD, EVEN = 0.003, 0.0003

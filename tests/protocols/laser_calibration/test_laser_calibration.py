@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.random import SeedSequence
 
 from bench.analysis.laser_calibration import LaserCalibration, LaserCurve
 from bench.analysis.sensor_accuracy import LINEARITY, SCALES, Draws, PeakReadings, SensorAccuracy, SensorUncertainty
@@ -302,8 +303,6 @@ def test_a_calibration_on_the_simulated_bench_agrees_with_its_lasers_and_serves_
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """The waves of the virtual lasers are drawn from the bench's seed; here they are read back from its streams."""
-    from numpy.random import SeedSequence
-
     out, blocks = tmp_path / "out", tmp_path / "blocks.toml"
     blocks.write_text("[acquisition]\nblock_duration = 0.2\n", encoding="utf-8")
     command = ["run", "laser-calibration", "--seed", "5", "--cycles", "4", "--passes", "6", "--config", str(blocks)]
@@ -334,6 +333,28 @@ def test_a_calibration_on_the_simulated_bench_agrees_with_its_lasers_and_serves_
     assert main(["run", "identify", "--config", str(bench), "--dry-run", "--json"]) == 0
     (said,) = json.loads(capsys.readouterr().out)["warnings"]
     assert "the laser calibration of 2020-01-01 expired on 2020-12-31" in said
+
+
+def test_an_error_with_short_waves_is_found(tmp_path: Path) -> None:
+    """Five and a half periods over the range; ten harmonics of each cycle would leave 21 um of it."""
+    out, bench, periods = tmp_path / "out", tmp_path / "bench.toml", 5.5
+    bench.write_text(
+        "[acquisition]\nblock_duration = 0.2\n[simulation.bench]\n"
+        f"laser_1.linearity_periods = {periods}\nlaser_2.linearity_periods = {periods}\n",
+        encoding="utf-8",
+    )
+    command = ["run", "laser-calibration", "--seed", "5", "--cycles", "4", "--passes", "6", "--config", str(bench)]
+    assert main([*command, "--out", str(out)]) == 0
+    one = read_calibration(out / "laser_calibration.json")
+    for curve, source in zip(one.lasers, SeedSequence(5).spawn(7)[3:5], strict=True):
+        draws = np.random.default_rng(source)
+        draws.uniform()
+        x = np.linspace(curve.lowest, curve.highest, 401)
+        bent = 0.0008 * RANGE * np.sin(2.0 * np.pi * periods * x / RANGE + draws.uniform(0.0, 2.0 * np.pi))
+        remaining = curve.corrected(x + bent) - x
+        remaining -= np.polynomial.Polynomial.fit(x, remaining, 1)(x)
+        assert bent.std() > 1e-4
+        assert remaining.std() < min(3.0 * curve.uncertainty, 1e-5)
 
 
 def test_storeys_that_stay_clamped_are_told() -> None:
