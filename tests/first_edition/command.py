@@ -53,8 +53,19 @@ OF_DELAY = ("measured", *OF_CHECK)
 """Of a line for a delay: those of lasers take the ages of their held readings from single cycles. What is measured may
 differ by the uncertainty that the first edition stated."""
 
-OF_CALIBRATION = ("scale_uncertainty",)
-"""Of a calibrated sensor: that of a laser was twice as large as it should be, and is a part of that of the table."""
+OF_CALIBRATION = {
+    "scale": "scale_uncertainty",
+    "scale_uncertainty": None,
+    "delay_s": "delay_uncertainty_s",
+    "delay_uncertainty_s": "delay_uncertainty_s",
+    "lowest_m": "residual_m",
+    "highest_m": "residual_m",
+    "largest_error_m": "residual_m",
+    "residual_m": "residual_m",
+}
+"""Of a calibrated sensor: the cycles are fitted with 21 harmonics instead of 10, so that errors with short waves are
+found. A value may differ by half the uncertainty that the first edition stated, given for each. That of a laser's scale
+was twice as large as it should be, and is a part of that of the table."""
 
 
 ROUNDED = {"alpha_1_predicted": 1e-14, "alpha_2_predicted": 1e-14, "alpha_2_predicted_uncertainty": 1e-9}
@@ -109,6 +120,9 @@ def differences(old: object, new: object, where: str = "", rounded: Mapping[str,
                 yield from differences(old[key], new[key], f"{where}.{key}", rounded)
             else:
                 yield f"{where}.{key} is missing"
+        for key, limit in OF_CALIBRATION.items() if "scale_uncertainty" in old else ():
+            if limit and old[key] is not None and abs(new[key] - old[key]) > 0.5 * old[limit]:
+                yield f"{where}.{key} was {old[key]!r} and is {new[key]!r}"
         if _changed(old) == OF_DELAY and abs(new["measured"] - old["measured"]) > old["uncertainty"]:
             yield f"{where}.measured was {old['measured']!r} and is {new['measured']!r}"
     elif isinstance(old, list) and isinstance(new, list) and old and _is_check_line(old[0]):
@@ -139,4 +153,4 @@ def _changed(old: Mapping[str, object]) -> tuple[str, ...]:
     """What is evaluated otherwise today, of a gain, a line of a check, or a calibrated sensor."""
     if _is_check_line(old):
         return OF_DELAY if str(old["what"]).startswith("delay ") else OF_CHECK
-    return INTERVALS if "alpha_2" in old else OF_CALIBRATION if "scale_uncertainty" in old else ()
+    return INTERVALS if "alpha_2" in old else (*OF_CALIBRATION,) if "scale_uncertainty" in old else ()
