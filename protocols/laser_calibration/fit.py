@@ -58,7 +58,10 @@ class Pass:
     speed: Array
     lasers: tuple[Array, Array]
     ratio: float
-    """Ratio of the table's displacement amplitude to the amplitude computed from its acceleration, a / omega^2."""
+    """Ratio of the span of the table's displacement to that computed from its acceleration. Since the lasers are
+    compared with the displacement over the same span, the linearity error of its sensor cancels in the scale of the
+    accelerometer.
+    """
     harmonics: int = HARMONICS
     """Number of harmonics fitted to the cycles, fewer with a low sample rate."""
 
@@ -108,15 +111,24 @@ def jackknife(found: Array) -> float:
 def mean_pass(cycles: Sequence[Cycle], omega: float) -> Pass:
     """A pass at `omega` [rad/s], computed from its cycles, whose signals are relative to the values at rest."""
     waves = mean_waves(cycles)
-    moved = np.mean([cycle.fundamental for cycle in cycles], axis=0)
+    displaced = _integrated_twice(waves.waveform[:, ACCELERATION], omega)
     return Pass(
         omega=omega,
         displacement=waves.waveform[:, DISPLACEMENT],
         speed=omega * waves.rates[:, DISPLACEMENT],
         lasers=(waves.waveform[:, LASER_1], waves.waveform[:, LASER_2]),
-        ratio=float(abs(moved[DISPLACEMENT]) * omega**2 / abs(moved[ACCELERATION])),
+        ratio=float(np.ptp(waves.waveform[:, DISPLACEMENT]) / np.ptp(displaced)),
         harmonics=min((cycle.coefficients.shape[0] - 1) // 2 for cycle in cycles),
     )
+
+
+def _integrated_twice(acceleration: Array, omega: float) -> Array:
+    """Displacement [m] for one period of an `acceleration` [m/s2] at `omega` [rad/s], shape (k,) each, without mean."""
+    spectrum = np.fft.rfft(acceleration)
+    orders = np.arange(1, spectrum.size)
+    spectrum[0] = 0.0
+    spectrum[1:] /= -((orders * omega) ** 2)
+    return np.fft.irfft(spectrum, acceleration.size)
 
 
 def fit_curve(passes: Sequence[Pass], laser: int, rest: float) -> ErrorCurve:
@@ -202,8 +214,8 @@ def calibration(
     # two standards that disagree by more than they should leave half of the excess to their mean
     excess = 0.5 * sqrt(max((slopes[1] - slopes[0]) ** 2 - (COVERAGE * apart) ** 2, 0.0))
     scatter = np.hypot(np.std(ratios, ddof=1) / sqrt(len(passes)), jackknife((curves[0].slopes + curves[1].slopes) / 2))
-    # an error of the curves also changes their slopes
-    bent = np.hypot(curves[0].uncertainty, curves[1].uncertainty) / (0.5 * span)
+    # higher orders also change the errors at both ends
+    bent = sqrt(2.0) * np.hypot(curves[0].residual, curves[1].residual) / span
     return LaserCalibration(
         date=date,
         valid_days=valid_days,

@@ -173,7 +173,7 @@ class Sensors:
             signals = self.signals(Motion(x, v, a, zero, zero, zero, zero), None)
             cycles = cycles_of(signals, omega, HARMONICS)
             passes.append(mean_pass(cycles, omega))
-        rests = float(self.rest[0]), float(self.rest[1])
+        rests = float(self.reading(0, np.zeros(1))[0]), float(self.reading(1, np.zeros(1))[0])
         return calibration(
             passes,
             (fit_curve(passes, 0, rests[0]), fit_curve(passes, 1, rests[1])),
