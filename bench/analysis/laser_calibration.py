@@ -33,7 +33,7 @@ class LaserCurve(Parameters):
         usual=(0.0, 2e-3),
     )
     uncertainty: float = quantity(
-        ..., "m", "standard uncertainty of the laser's error at one reading", ge=0, usual=(1e-6, 1e-3)
+        ..., "m", "standard uncertainty of the laser's error at one reading", ge=0, usual=(1e-7, 1e-3)
     )
     scale: float = quantity(..., "1", "span of the laser's readings, relative to the mean span of both lasers")
     delay: float = quantity(..., "s", "delay relative to the table's displacement sensor", usual=(1e-5, 0.05))

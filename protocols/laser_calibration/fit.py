@@ -9,9 +9,10 @@ storeys; passes at two frequencies separate c from a scale error. All three are 
 cycles of the passes, at equal steps of the phase; e is a sum of Chebyshev polynomials of the reading. The motion need
 not be a pure sine, since the laser and the table's sensor measure the same motion.
 
-The order is chosen by cross-validation. It is the lowest order whose curves, fitted to all passes but one, predict the
-omitted pass as well as the best order does, within one standard error. The uncertainty of the curve combines the
-scatter of the curves that omit each pass in turn (jackknife) and the contribution of higher orders.
+The order is chosen by cross-validation: it is the one whose curves, fitted to all passes but one, predict the omitted
+pass best. Higher orders add little noise, so that the lowest order within one standard error of the best, a usual
+choice, would have larger errors. The uncertainty of the curve combines the scatter of the curves that omit each pass in
+turn (jackknife) and the contribution of higher orders.
 
 The lasers are the length standard: their scale error over the span of the passes follows from the smooth linearity
 error on their data sheets, which is assumed to be smaller than the scale error of the table's sensors. The table's
@@ -156,9 +157,7 @@ def fit_curve(passes: Sequence[Pass], laser: int, rest: float) -> ErrorCurve:
 
     squares: Array = np.array([[missed(order, out) for out in every] for order in range(1, highest + 1)])
     means = squares.mean(axis=1)
-    best = int(means.argmin())
-    allowed = means[best] + float(np.std(squares[best], ddof=1)) / sqrt(len(passes))
-    order = int(np.flatnonzero(means <= allowed)[0]) + 1
+    order = int(means.argmin()) + 1
     whole, finest = solved(order), solved(highest)
     alone: Array = np.array([solved(order, out) for out in every])
     at = np.linspace(-1.0, 1.0, READINGS)

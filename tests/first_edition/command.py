@@ -61,10 +61,11 @@ OF_CALIBRATION = {
     "lowest_m": "residual_m",
     "highest_m": "residual_m",
     "largest_error_m": "residual_m",
-    "residual_m": "residual_m",
+    "residual_m": None,
+    "order": None,
 }
 """Of a calibrated sensor: the cycles are fitted with 21 harmonics instead of 10, so that errors with short waves are
-found. A value may differ by half the uncertainty that the first edition stated, given for each. That of a laser's scale
+found, and the order is the best one instead of the lowest that is hardly worse. A value may differ by half the uncertainty that the first edition stated, given for each. That of a laser's scale
 was twice as large as it should be, and is a part of that of the table."""
 
 
