@@ -123,8 +123,8 @@ class LaserCheck:
 def advice(
     parameters: EarthquakeParameters, configuration: BenchConfiguration, points: Sequence[Mapping[str, Any]]
 ) -> str:
-    """Sentence that recommends the check; empty if the lasers were checked or calibrated, or if their linearity does
-    not dominate the uncertainty of alpha_2 at any of the `points`, which have the fields of the results.
+    """Sentence that recommends the check; empty if it was requested, if the lasers are calibrated, or if their
+    linearity does not dominate the uncertainty of alpha_2 at any of the `points`, which have the fields of the results.
     """
     if parameters.laser_check or configuration.calibrated is not None:
         return ""
@@ -137,8 +137,8 @@ def advice(
         return ""
     return (
         f"The linearity of the lasers dominates {number} of {len(measured)} uncertainties of the measured alpha_2: "
-        "--laser-check measures it before the records, which takes one and a half minutes and usually reduces these "
-        "uncertainties to a tenth."
+        "without a laser calibration, --laser-check measures it before the records, which takes one and a half minutes "
+        "and usually reduces these uncertainties to a tenth."
     )
 
 

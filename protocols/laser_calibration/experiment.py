@@ -25,9 +25,10 @@ from bench.preflight.motion import laser_demands
 from bench.protocol import Plan, Prepared, Result, Sources
 from drivers.rig import OperatorTask
 from protocols.common.calibrate import STOREYS_CLAMPED
-from protocols.laser_calibration.fit import ErrorCurve, disagreements
+from protocols.laser_calibration.curves import ErrorCurve
 from protocols.laser_calibration.plan import START, expected_duration, measure, planned_passes
 from protocols.laser_calibration.protocol import CalibratedSensor, LaserCalibrationParameters
+from protocols.laser_calibration.scales import disagreements
 from sim.errors import InvalidInput, RockbenchError
 from sim.parameters import Parameters
 

@@ -24,16 +24,9 @@ from bench.engine.steps import (
 )
 from bench.events import Progress, StepStarted
 from protocols.common.calibrate import SETTLING, Unmeasurable, calibrate_drive, complete_cycles, probed_drive
-from protocols.laser_calibration.fit import (
-    HARMONICS,
-    ErrorCurve,
-    Pass,
-    calibration,
-    fit_curve,
-    mean_pass,
-    require_agreement,
-)
+from protocols.laser_calibration.curves import HARMONICS, ErrorCurve, Pass, fit_curve, mean_pass
 from protocols.laser_calibration.protocol import LaserCalibrationParameters
+from protocols.laser_calibration.scales import calibration, require_agreement
 from sim.channel import STOREYS
 
 REST = 2.0

@@ -58,7 +58,7 @@ PROTOCOL = Protocol(
     summary="Calibrate both lasers and the table's sensors against each other in a slow motion with the frame locked.",
     details=(
         "The storeys are clamped to the table, which moves slowly over the range to be calibrated. The result is "
-        "the scale, the smooth linearity error and the delay of each laser, and the agreement between the lasers. "
+        "the scale, the linearity error and the delay of each laser, and the agreement between the lasers. "
         "To apply the result, laser_calibration.json, in other runs, set the key `laser_calibration` in their "
         "configuration to its path. "
         "Without options, a run has eight passes of up to 50 mm and takes about four minutes."

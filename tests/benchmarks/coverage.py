@@ -264,6 +264,8 @@ def main() -> None:
         "--periods", nargs="+", type=float, default=[], help="under the record, periods of the linearity errors"
     )
     asked = parser.parse_args()
+    if asked.record is None and (asked.beta is not ASKED.beta or asked.laser_check or asked.periods):
+        parser.error("--beta, --laser-check and --periods apply to --record")
     if asked.record is not None:
         seismic(asked.benches, asked.record, asked.beta, asked.periods, checked=asked.laser_check)
         return

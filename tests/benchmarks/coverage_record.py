@@ -116,9 +116,9 @@ def _scatter(errors: Array) -> float:
 def seismic(
     trials: int, name: str, betas: Sequence[float], periods: Sequence[float] = (), *, checked: bool = False
 ) -> None:
-    """Print the coverage under the record `name` at each stiffness ratio, with default lasers and after a calibration.
-    With `periods`, of lasers with these numbers of periods in their linearity error; `checked` with the check of the
-    lasers.
+    """Print the coverage under the record `name` at each stiffness ratio, with default lasers: `checked`, or by the
+    data sheets and after a calibration. With `periods`, of lasers with these numbers of periods in their linearity
+    error.
     """
     cases = [Case(f"{each:g} periods", waves=(each, each)) for each in periods]
     for case in cases or [CASES["default"], *([] if checked else [CASES["calibrated"]])]:

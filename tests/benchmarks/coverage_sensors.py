@@ -13,9 +13,10 @@ from bench.analysis.cycles import Cycle, CycleAnalyser
 from bench.analysis.laser_calibration import LaserCalibration
 from bench.analysis.sensor_accuracy import SensorAccuracy
 from bench.analysis.signals import SignalMap
-from protocols.laser_calibration.fit import HARMONICS, calibration, fit_curve, mean_pass
+from protocols.laser_calibration.curves import HARMONICS, fit_curve, mean_pass
 from protocols.laser_calibration.plan import planned_passes
 from protocols.laser_calibration.protocol import LaserCalibrationParameters
+from protocols.laser_calibration.scales import calibration
 from sim.excitation import SampledRecord
 from sim.filter_unit import FilterUnit
 from sim.rocking import State, Status, simulate

@@ -148,7 +148,7 @@ def run(folder: Path, bench: Path, *options: str) -> dict[str, Any]:
         "--config",
         str(bench),
     ]
-    assert main(["run", "earthquake", *asked, *options, "--json", "--out", str(folder)]) == 0
+    assert main(["run", "earthquake", *asked, *options, "--out", str(folder)]) == 0
     (point,) = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["points"]
     return point
 
@@ -157,7 +157,9 @@ def test_a_check_narrows_the_uncertainty_and_the_file_replays(
     bench: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     without = run(tmp_path / "without", bench)
+    assert "--laser-check measures" in capsys.readouterr().out
     checked = run(tmp_path / "checked", bench, "--laser-check")
+    assert "--laser-check measures" not in capsys.readouterr().out
     assert checked["agrees"] is True
     assert checked["alpha_2"] == pytest.approx(without["alpha_2"], rel=0.005)
     assert checked["alpha_2_uncertainty"] < 0.4 * without["alpha_2_uncertainty"]

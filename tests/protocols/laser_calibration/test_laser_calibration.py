@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from numpy.random import SeedSequence
 
+from bench.analysis.cycles import CycleAnalyser
 from bench.analysis.laser_calibration import LaserCalibration, LaserCurve
 from bench.analysis.sensor_accuracy import LINEARITY, SCALES, Draws, PeakReadings, SensorAccuracy, SensorUncertainty
-from bench.analysis.signals import ACCELERATION, DRIFT, LASER_1, LASER_2, U1, SignalMap
+from bench.analysis.signals import ACCELERATION, DISPLACEMENT, DRIFT, LASER_1, LASER_2, SIGNALS, U1, SignalMap
 from bench.app.catalogue import load_protocol
 from bench.app.cli.main import main
 from bench.config.model import BenchConfiguration
@@ -22,15 +23,9 @@ from bench.datafile.reader import open_datafile
 from bench.engine.steps import AcquireAtRest, Done, OperatorAction, RestSamples
 from drivers.rig import Channel, OperatorTask
 from protocols.common.calibrate import Unmeasurable
-from protocols.laser_calibration.fit import (
-    ErrorCurve,
-    Pass,
-    calibration,
-    disagreements,
-    fit_curve,
-    require_agreement,
-)
+from protocols.laser_calibration.curves import HARMONICS, ErrorCurve, Pass, fit_curve, mean_pass
 from protocols.laser_calibration.protocol import LaserCalibrationParameters
+from protocols.laser_calibration.scales import calibration, disagreements, require_agreement
 from sim.channel import STOREYS
 from sim.errors import InvalidInput
 
@@ -158,6 +153,54 @@ def test_what_is_stated_of_the_curve_is_what_is_left() -> None:
         curve = left(one, k, places + RESTS[k])
         curve -= np.polynomial.Polynomial.fit(places, curve, 1)(places)
         assert 0.3 * one.lasers[k].uncertainty < curve.std() < 2.0 * one.lasers[k].uncertainty
+
+
+def test_the_linearity_of_the_displacement_sensor_cancels_in_the_scale_of_the_accelerometer() -> None:
+    """One and a half waves over the span change it otherwise than the fundamental; the table has harmonics."""
+    amplitude, rate, passes, alone = 0.05, 2000.0, list[Pass](), list[float]()
+    for omega in (4.0, 8.0):
+        phase = omega * np.arange(round(5.2 * 2.0 * np.pi / omega * rate)) / rate
+        x = amplitude * (np.sin(phase) + 0.01 * np.sin(3.0 * phase + 0.5))
+        values = np.zeros((phase.size, len(SIGNALS) + 1))
+        values[:, DISPLACEMENT] = x + 5e-4 * 2.0 * amplitude * np.sin(1.5 * np.pi * x / amplitude)
+        values[:, ACCELERATION] = -1.003 * omega**2 * amplitude * (np.sin(phase) + 0.09 * np.sin(3.0 * phase + 0.5))
+        values[:, LASER_1] = x
+        cycles = CycleAnalyser(omega, rate, 0, HARMONICS).push(values)
+        passes.append(mean_pass(cycles, omega))
+        displacement, acceleration = np.abs(cycles[0].fundamental[[DISPLACEMENT, ACCELERATION]])
+        alone.append(displacement * omega**2 / acceleration)
+    assert [each.harmonics for each in passes] == [HARMONICS, HARMONICS]
+    # what the calibration states: span of the lasers over that of the sensor, times the ratio
+    factor = 1.0 / (1.0 - fit_curve(passes, 0, 0.0).slope)
+    assert factor * np.mean([each.ratio for each in passes]) == pytest.approx(1.0 / 1.003, abs=1e-4)
+    assert factor * np.mean(alone) != pytest.approx(1.0 / 1.003, abs=2e-4)
+
+
+def test_few_harmonics_leave_short_waves_to_the_uncertainty() -> None:
+    """With few samples per cycle, the order is at its limit, and more of the error remains."""
+    places = np.linspace(-0.045, 0.045, 181)
+
+    def short(place: np.ndarray) -> np.ndarray:
+        return 1.6e-4 * np.sin(2.0 * np.pi * 5.5 * place / RANGE + 0.7)
+
+    def passes(harmonics: int) -> list[Pass]:
+        found: list[Pass] = []
+        for k in range(8):
+            omega, amplitude = 4.0 if k < 4 else 8.0, 0.05 * (1.0 - 0.01 * k)
+            x = amplitude * np.sin(PHASES)
+            spectrum = np.fft.rfft(x + short(x))
+            spectrum[harmonics + 1 :] = 0.0
+            shown = np.fft.irfft(spectrum, x.size)
+            found.append(Pass(omega, x, omega * amplitude * np.cos(PHASES), (shown, shown), 1.0, harmonics))
+        return found
+
+    for harmonics, largest in ((10, 1e-4), (HARMONICS, 2e-6)):
+        curve = fit_curve(passes(harmonics), 0, 0.0)
+        readings = places + short(places)
+        inside = (2.0 * readings - curve.high - curve.low) / (curve.high - curve.low)
+        remaining = (np.polynomial.chebyshev.chebval(inside, curve.error) - short(places)).std()
+        assert remaining < min(2.0 * curve.uncertainty, largest)
+    assert curve.error.size - 1 > 9
 
 
 CHANNELS = tuple(

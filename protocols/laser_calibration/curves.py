@@ -1,0 +1,176 @@
+"""Errors of the lasers from cycles of a common motion.
+
+During a slow sine of the table with displacement x and velocity v, a laser reads
+
+    r = x + e(r) - d v + c omega^2 x
+
+where e is the laser's position-dependent error, d its delay, and c the compliance of the clamps, which accelerate the
+storeys; passes at two frequencies separate c from a scale error. All three are fitted by least squares to the mean
+cycles of the passes, at equal steps of the phase; e is a sum of Chebyshev polynomials of the reading. The motion need
+not be a pure sine, since the laser and the table's sensor measure the same motion.
+
+The order is chosen by cross-validation: it is the one whose curves, fitted to all passes but one, predict the omitted
+pass best. Higher orders add little noise, so that the lowest order within one standard error of the best, a usual
+choice, would have larger errors. The uncertainty of the curve combines the scatter of the curves that omit each pass in
+turn (jackknife) and the contribution of higher orders, or of the highest one if this is chosen.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import sqrt
+
+import numpy as np
+from numpy.polynomial import chebyshev
+from numpy.typing import NDArray
+
+from bench.analysis.cycles import Cycle, mean_waves
+from bench.analysis.signals import ACCELERATION, DISPLACEMENT, LASER_1, LASER_2
+
+Array = NDArray[np.float64]
+
+HIGHEST = 20
+"""Highest order of the fit, sufficient for an error with six periods over the measuring range if the passes cover half
+of it.
+"""
+
+HARMONICS = HIGHEST + 1
+"""Number of harmonics fitted to the cycles: the order k of an error shows in the harmonics up to about k."""
+
+READINGS = 201
+"""Number of readings at which curves are compared."""
+
+
+@dataclass(frozen=True, eq=False)
+class Pass:
+    """Mean cycle of a pass at `omega` [rad/s]: displacement [m] and velocity [m/s] of the table, and readings of both
+    lasers relative to rest [m], shape (k,) each.
+    """
+
+    omega: float
+    displacement: Array
+    speed: Array
+    lasers: tuple[Array, Array]
+    ratio: float
+    """Ratio of the span of the table's displacement to that computed from its acceleration. Since the lasers are
+    compared with the displacement over almost the same span, the linearity error of its sensor largely cancels in the
+    scale of the accelerometer.
+    """
+    harmonics: int = HARMONICS
+    """Number of harmonics fitted to the cycles, fewer with a low sample rate."""
+
+
+@dataclass(frozen=True, eq=False)
+class ErrorCurve:
+    """Error curve of one laser relative to the measured table displacement: Chebyshev coefficients `error` [m] over the
+    readings from `low` to `high` [m], and `delay` [s]. `scores` [m], shape (orders,), are the rms prediction errors of
+    the orders from 1 on; `residual` [m] is the rms contribution of higher orders, or of the highest one if this is
+    chosen. `without` [m], shape (passes, READINGS), are the curves, and `delays` [s], shape (passes,), the delays,
+    fitted without each pass in turn.
+    """
+
+    low: float
+    high: float
+    error: Array
+    delay: float
+    scores: Array
+    residual: float
+    without: Array
+    delays: Array
+
+    @property
+    def uncertainty(self) -> float:
+        """Standard uncertainty of the curve at one reading [m], excluding the mean error."""
+        bent = self.without - self.without.mean(axis=1)[:, None]
+        variance = float(np.mean([jackknife(place) ** 2 for place in bent.T]))
+        return sqrt(variance + self.residual**2)
+
+    @property
+    def slope(self) -> float:
+        """Change of the error from `low` to `high`, relative to the span of the readings."""
+        ends = chebyshev.chebval(np.array([-1.0, 1.0]), self.error)
+        return float(ends[1] - ends[0]) / (self.high - self.low)
+
+    @property
+    def slopes(self) -> Array:
+        """Slopes of the curves fitted without each pass in turn, shape (passes,)."""
+        spans: Array = self.without[:, -1] - self.without[:, 0]
+        return spans / (self.high - self.low)
+
+
+def jackknife(found: Array) -> float:
+    """Jackknife standard uncertainty of a value, from its estimates with one of the n passes omitted, shape (n,)."""
+    return sqrt((found.size - 1) / found.size * float(np.sum((found - found.mean()) ** 2)))
+
+
+def mean_pass(cycles: Sequence[Cycle], omega: float) -> Pass:
+    """A pass at `omega` [rad/s], computed from its cycles, whose signals are relative to the values at rest."""
+    waves = mean_waves(cycles)
+    displaced = _integrated_twice(waves.waveform[:, ACCELERATION], omega)
+    return Pass(
+        omega=omega,
+        displacement=waves.waveform[:, DISPLACEMENT],
+        speed=omega * waves.rates[:, DISPLACEMENT],
+        lasers=(waves.waveform[:, LASER_1], waves.waveform[:, LASER_2]),
+        ratio=float(np.ptp(waves.waveform[:, DISPLACEMENT]) / np.ptp(displaced)),
+        harmonics=min((cycle.coefficients.shape[0] - 1) // 2 for cycle in cycles),
+    )
+
+
+def _integrated_twice(acceleration: Array, omega: float) -> Array:
+    """Displacement [m] for one period of an `acceleration` [m/s2] at `omega` [rad/s], shape (k,) each, without mean."""
+    spectrum = np.fft.rfft(acceleration)
+    orders = np.arange(1, spectrum.size)
+    spectrum[0] = 0.0
+    spectrum[1:] /= -((orders * omega) ** 2)
+    return np.fft.irfft(spectrum, acceleration.size)
+
+
+def fit_curve(passes: Sequence[Pass], laser: int, rest: float) -> ErrorCurve:
+    """Error curve of laser 0 or 1, whose reading at rest is `rest` [m]; the passes must include two frequencies."""
+    readings = [rest + each.lasers[laser] for each in passes]
+    # the range that all passes cover
+    low, high = max(float(r.min()) for r in readings), min(float(r.max()) for r in readings)
+    highest = max(min(HIGHEST, min(each.harmonics for each in passes) - 1), 1)
+    rows = [_columns(r, each, low, high, highest) for r, each in zip(readings, passes, strict=True)]
+    errors = [r - each.displacement for r, each in zip(readings, passes, strict=True)]
+    every = range(len(passes))
+
+    def solved(order: int, out: int | None = None) -> Array:
+        kept = [*range(order + 1), -2, -1]
+        chosen = [k for k in every if k != out]
+        found, *_ = np.linalg.lstsq(
+            np.concatenate([rows[k][:, kept] for k in chosen]), np.concatenate([errors[k] for k in chosen]), rcond=None
+        )
+        return found.astype(np.float64)
+
+    def missed(order: int, out: int) -> float:
+        wrong = errors[out] - rows[out][:, [*range(order + 1), -2, -1]] @ solved(order, out)
+        # the variance excludes the mean, since quantisation shifts the zero differently in each pass
+        return float(np.var(wrong))
+
+    squares: Array = np.array([[missed(order, out) for out in every] for order in range(1, highest + 1)])
+    means = squares.mean(axis=1)
+    order = int(means.argmin()) + 1
+    whole, finest = solved(order), solved(highest)
+    coarser = whole if order < highest else solved(max(highest - 1, 1))
+    alone: Array = np.array([solved(order, out) for out in every])
+    at = np.linspace(-1.0, 1.0, READINGS)
+    return ErrorCurve(
+        low=low,
+        high=high,
+        error=whole[:-2],
+        delay=float(whole[-2]),
+        scores=np.sqrt(means),
+        residual=float(np.std(chebyshev.chebval(at, finest[:-2]) - chebyshev.chebval(at, coarser[:-2]))),
+        without=(chebyshev.chebvander(at, order) @ alone[:, :-2].T).T.astype(np.float64),
+        delays=alone[:, -2],
+    )
+
+
+def _columns(readings: Array, each: Pass, low: float, high: float, highest: int) -> Array:
+    """Columns of the fit, shape (k, highest + 3): Chebyshev polynomials up to the order `highest`, delay, and
+    compliance of the clamps.
+    """
+    place = (2.0 * readings - high - low) / (high - low)
+    columns = (chebyshev.chebvander(place, highest), -each.speed, each.omega**2 * each.displacement)
+    return np.column_stack(columns).astype(np.float64)

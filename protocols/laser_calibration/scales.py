@@ -1,0 +1,152 @@
+"""Scales of lasers and table sensors from the error curves of a calibration.
+
+The lasers are the length standard: their scale error over the span of the passes follows from the linearity error on
+their data sheets, which is assumed to be smaller than the scale error of the table's sensors. The table's sensors and
+each laser are therefore compared with the mean span of both lasers.
+"""
+
+from collections.abc import Sequence
+from datetime import datetime
+from math import hypot, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.analysis.laser_calibration import LaserCalibration, LaserCurve
+from bench.analysis.sensor_accuracy import SensorAccuracy
+from bench.analysis.uncertainty import COVERAGE
+from bench.config.model import BenchConfiguration
+from protocols.common.calibrate import Unmeasurable
+from protocols.laser_calibration.curves import ErrorCurve, Pass, jackknife
+
+Array = NDArray[np.float64]
+
+
+def calibration(
+    passes: Sequence[Pass],
+    curves: tuple[ErrorCurve, ErrorCurve],
+    rests: tuple[float, float],
+    devices: tuple[str, str],
+    accuracy: SensorAccuracy,
+    ranges: tuple[float, float],
+    *,
+    reference_linearity: float,
+    valid_days: float,
+    date: datetime,
+) -> LaserCalibration:
+    """Calibration of all sensors.
+
+    `reference_linearity` is the linearity error of the displacement sensor, relative to the covered range; `accuracy`
+    and `ranges` [m] are taken from the lasers' data sheets.
+    """
+    slopes = [curve.slope for curve in curves]
+    # ratio of the true displacement (mean span of the lasers) to the one measured by the table's sensor
+    factor = 1.0 / (1.0 - 0.5 * sum(slopes))
+    found = [
+        LaserCurve(
+            sensor=device,
+            lowest=curve.low,
+            highest=curve.high,
+            rest=rest,
+            error=tuple(_rescaled(curve, factor).tolist()),
+            uncertainty=curve.uncertainty,
+            scale=(1.0 - 0.5 * sum(slopes)) / (1.0 - slope),
+            delay=curve.delay,
+            delay_uncertainty=jackknife(curve.delays),
+        )
+        for curve, rest, device, slope in zip(curves, rests, devices, slopes, strict=True)
+    ]
+    span = _span(curves)
+    ratios = np.array([each.ratio for each in passes])
+    apart = _difference_uncertainty(curves, accuracy, ranges)
+    # two standards that disagree by more than they should leave half of the excess to their mean
+    excess = 0.5 * sqrt(max((slopes[1] - slopes[0]) ** 2 - (COVERAGE * apart) ** 2, 0.0))
+    scatter = np.hypot(np.std(ratios, ddof=1) / sqrt(len(passes)), jackknife((curves[0].slopes + curves[1].slopes) / 2))
+    # an error due to higher orders at both ends, as large as at any reading
+    bent = sqrt(2.0) * np.hypot(curves[0].residual, curves[1].residual) / span
+    return LaserCalibration(
+        date=date,
+        valid_days=valid_days,
+        laser_1=found[0],
+        laser_2=found[1],
+        differential_scale=found[1].scale / found[0].scale,
+        differential_uncertainty=float(np.hypot(jackknife(curves[1].slopes - curves[0].slopes), bent)),
+        common_linearity=reference_linearity * span,
+        table_displacement=factor,
+        table_acceleration=factor * float(ratios.mean()),
+        table_uncertainty=hypot(0.5 * apart, excess, scatter),
+    )
+
+
+IMPLAUSIBLE = 3.0
+"""Ratio of a difference between scales to its standard uncertainty above which an error of a sensor is likely."""
+
+DISAGREE = 0.05
+"""Largest relative difference between the spans of two lasers that measure the same motion; a larger one is no error of
+scale.
+"""
+
+
+def require_agreement(curves: tuple[ErrorCurve, ErrorCurve]) -> None:
+    """Raise Unmeasurable if the lasers do not measure the same motion."""
+    first, second = (curve.slope for curve in curves)
+    if not abs(second - first) <= DISAGREE:
+        raise Unmeasurable(
+            f"the spans of the two lasers differ by {100.0 * (second - first):+.1f} %, although both measure the "
+            "motion of the table: check where they are aimed, their ranges, and the load resistors of analogue outputs"
+        )
+
+
+def disagreements(
+    found: LaserCalibration, curves: tuple[ErrorCurve, ErrorCurve], configuration: BenchConfiguration
+) -> list[str]:
+    """Remarks on sensors whose scales differ by more than `IMPLAUSIBLE` times the uncertainty of their difference."""
+    accuracy = configuration.analysis
+    apart = _difference_uncertainty(curves, accuracy, configuration.laser_ranges)
+    lasers, remarks = curves[1].slope - curves[0].slope, list[str]()
+    if abs(lasers) > (bound := IMPLAUSIBLE * apart):
+        remarks.append(
+            f"the spans of the two lasers differ by {100.0 * lasers:+.2f} %, more than their data sheets allow "
+            f"({100.0 * bound:.2f} %): check their ranges and the load resistors of analogue outputs; the uncertainty "
+            "of the table's scale contains the difference"
+        )
+    bound = IMPLAUSIBLE * hypot(0.5 * apart, accuracy.table_scale)
+    for name, factor in (("displacement", found.table_displacement), ("acceleration", found.table_acceleration)):
+        if abs(factor - 1.0) > bound:
+            remarks.append(
+                f"the scale of the table's {name} differs by {100.0 * (factor - 1.0):+.2f} % from that of the lasers, "
+                f"more than the data sheets allow ({100.0 * bound:.2f} %): check its sensitivity in the configuration"
+            )
+    return remarks
+
+
+def _difference_uncertainty(
+    curves: tuple[ErrorCurve, ErrorCurve], accuracy: SensorAccuracy, ranges: tuple[float, float]
+) -> float:
+    """Relative standard uncertainty of the difference between the spans of the two lasers, from their data sheets; that
+    of the mean of both is half of it.
+    """
+    return hypot(*(_span_uncertainty(_span(curves), accuracy, whole) for whole in ranges))
+
+
+def _span(curves: tuple[ErrorCurve, ErrorCurve]) -> float:
+    """Span of the readings that both lasers cover [m]."""
+    return min(curve.high - curve.low for curve in curves)
+
+
+def _span_uncertainty(span: float, accuracy: SensorAccuracy, whole: float) -> float:
+    """Relative standard uncertainty of a `span` [m] measured by one laser with the range `whole` [m].
+
+    The variance due to the scale is half that of the difference between two lasers. Since the shape of the linearity
+    error is unknown, the errors at the two ends of the span are assumed independent, each with the variance of a sine.
+    """
+    return float(np.hypot(accuracy.laser_linearity * whole / span, accuracy.laser_mismatch / sqrt(2.0)))
+
+
+def _rescaled(curve: ErrorCurve, factor: float) -> Array:
+    """Coefficients of the error relative to the true displacement, which is `factor` times the measured displacement:
+    r - factor * (r - e).
+    """
+    error = factor * curve.error
+    error[:2] += (1.0 - factor) * np.array([0.5 * (curve.high + curve.low), 0.5 * (curve.high - curve.low)])
+    return error
