@@ -134,13 +134,15 @@ def fit_curve(passes: Sequence[Pass], laser: int, rest: float) -> ErrorCurve:
     rows = [_columns(r, each, low, high, highest) for r, each in zip(readings, passes, strict=True)]
     errors = [r - each.displacement for r, each in zip(readings, passes, strict=True)]
     every = range(len(passes))
+    # the triangular factor of each pass has the same solutions as its rows, which are ten times as many
+    factors = [
+        np.linalg.qr(np.column_stack((columns, error)), mode="r") for columns, error in zip(rows, errors, strict=True)
+    ]
 
     def solved(order: int, out: int | None = None) -> Array:
-        kept = [*range(order + 1), -2, -1]
-        chosen = [k for k in every if k != out]
-        found, *_ = np.linalg.lstsq(
-            np.concatenate([rows[k][:, kept] for k in chosen]), np.concatenate([errors[k] for k in chosen]), rcond=None
-        )
+        kept = [*range(order + 1), -3, -2]
+        reduced = np.concatenate([factors[k] for k in every if k != out])
+        found, *_ = np.linalg.lstsq(reduced[:, kept], reduced[:, -1], rcond=None)
         return found.astype(np.float64)
 
     def missed(order: int, out: int) -> float:
