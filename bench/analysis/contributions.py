@@ -22,6 +22,7 @@ class Source:
 
 
 _CALIBRATE = "calibrate the lasers (laser calibration test)"
+_CALIBRATE_TABLE = "calibrate the accelerometer (against the lasers: laser calibration test)"
 _FASTER = "increase the measuring rate of the lasers"
 _FINER = "use a laser with a finer resolution or a shorter range"
 _MASSES = "weigh the storeys with a better balance"
@@ -36,7 +37,7 @@ SOURCES: Mapping[str, Source] = {
     "scatter of the cycles": Source("A", "measured cycles, with their correlation", "measure more cycles"),
     "remaining transient": Source("A", "decay fitted to the measured cycles", "wait longer before measuring"),
     "amplitude of the table": Source(
-        "B", "scale of the accelerometer, times the predicted slope of the gain", "calibrate the accelerometer"
+        "B", "scale of the accelerometer, times the predicted slope of the gain", _CALIBRATE_TABLE
     ),
     "noise of the peaks": Source("A", "residual of the signals around the peaks", "repeat the test"),
     "choice of the largest peak": Source("B", "linearity of the lasers at peaks of almost the same size", _CALIBRATE),
@@ -46,9 +47,7 @@ SOURCES: Mapping[str, Source] = {
     "noise of the table's motion": Source(
         "A", "simulations with the noise of the accelerometer at rest", "use an accelerometer with less noise"
     ),
-    "scale of the table's sensors": Source(
-        "B", "simulations with the assumed scale error", "calibrate the accelerometer"
-    ),
+    "scale of the table's sensors": Source("B", "simulations with the assumed scale error", _CALIBRATE_TABLE),
     "stiffness and damping of the frame": Source(
         "B", "assumed or identified specimen, in simulations", "identify the frame (free vibration test)"
     ),

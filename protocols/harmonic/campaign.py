@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from bench.analysis.contributions import SOURCES
 from bench.analysis.steady import WINDOW
 from bench.config.model import BenchConfiguration
 from bench.control.cycle_identification import EXCITATION
@@ -290,6 +291,8 @@ def _remarks(rows: list[dict[str, Any]]) -> list[str]:
         named = ", ".join(f"{name} ({number})" for name, number in most)
         span = " to ".join(dict.fromkeys(f"{share:.2f}" for share in (min(shares), max(shares))))
         text = f"Expanded uncertainty of alpha_2 (k = 2): {span} %; largest contribution (number of points): {named}."
+        if (source := SOURCES.get(most[0][0])) is not None:
+            text += f" To reduce {'it' if len(most) == 1 else 'the first'}: {source.measure}."
         lines += textwrap.wrap(text, WIDTH)
     remarks = [str(row.get("reason") or "").split("; ") for row in rows]
     shared = [each for each in remarks[0] if each and all(each in own for own in remarks)] if len(rows) > 1 else []

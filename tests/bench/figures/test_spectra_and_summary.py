@@ -270,6 +270,20 @@ def test_table_stays_narrow_and_says_what_needs_a_look() -> None:
     assert "omega 12.5 rad/s, beta 0.64: the block overturned in each of 6 starts" in text
 
 
+def test_the_largest_contribution_is_named_with_its_remedy() -> None:
+    def text(*names: str) -> str:
+        points = [
+            point(12.5 + k, 0.97, "steady", 0.5, agrees=True).model_copy(update={"dominating": name})
+            for k, name in enumerate(names)
+        ]
+        return " ".join(points_table(points).split())
+
+    two = text("scatter of the cycles", "scatter of the cycles", "amplitude of the table")
+    assert "scatter of the cycles (2), amplitude of the table (1). To reduce the first: measure more cycles." in two
+    assert "amplitude of the table (1). To reduce it: calibrate the accelerometer" in text("amplitude of the table")
+    assert "To reduce" not in text("a name of another program")
+
+
 def test_a_remark_on_every_point_is_listed_once() -> None:
     common = "the linearity error of laser_2 is not smooth"
     points = [
