@@ -68,13 +68,18 @@ class Cycle:
     traces: NDArray[np.float32]
     first: int = 0
 
+    @property
+    def fitted(self) -> int:
+        """Number of fitted harmonics."""
+        return (self.coefficients.shape[0] - 1) // 2
+
     def harmonics(self, column: int) -> NDArray[np.complex128]:
         """Complex amplitudes z_k of one signal, shape (HARMONICS,): the signal is its mean plus Im(sum of z_k exp(i k
         phase)).
 
         Harmonics that were not fitted are zero; those above HARMONICS are omitted.
         """
-        fitted = (self.coefficients.shape[0] - 1) // 2
+        fitted = self.fitted
         found = np.zeros(HARMONICS, dtype=np.complex128)
         cosines, sines = self.coefficients[1 : 1 + fitted, column], self.coefficients[1 + fitted :, column]
         found[:fitted] = (sines + 1j * cosines)[:HARMONICS]
@@ -187,8 +192,8 @@ def mean_waves(cycles: Sequence[Cycle], bound: Mapping[int, int] | None = None) 
     `bound` maps a column to the highest harmonic of its signal; the mean and the higher harmonics of that signal are
     set to zero.
     """
-    harmonics = min((cycle.coefficients.shape[0] - 1) // 2 for cycle in cycles)
-    all_coefficients = np.array([_up_to(harmonics, cycle.coefficients) for cycle in cycles])
+    harmonics = min(cycle.fitted for cycle in cycles)
+    all_coefficients = np.array([_up_to(harmonics, cycle) for cycle in cycles])
     orders: NDArray[np.float64] = np.arange(1, harmonics + 1, dtype=np.float64)
     for column, highest in (bound or {}).items():
         all_coefficients[:, np.concatenate(([0.0], orders, orders)) > highest, column] = 0.0
@@ -213,9 +218,9 @@ def mean_waves(cycles: Sequence[Cycle], bound: Mapping[int, int] | None = None) 
     )
 
 
-def _up_to(harmonics: int, coefficients: NDArray[np.float64]) -> NDArray[np.float64]:
+def _up_to(harmonics: int, cycle: Cycle) -> NDArray[np.float64]:
     """Coefficients of a cycle up to a harmonic."""
-    fitted = (coefficients.shape[0] - 1) // 2
+    coefficients, fitted = cycle.coefficients, cycle.fitted
     if fitted == harmonics:
         return coefficients
     return np.concatenate((coefficients[: 1 + harmonics], coefficients[1 + fitted : 1 + fitted + harmonics]))

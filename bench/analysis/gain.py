@@ -152,7 +152,7 @@ def _readings(cycles: Sequence[Cycle], waves: Waves, omega: float, drift: float)
 
 def _checks(cycles: Sequence[Cycle], waves: Waves, omega: float, frame: LinearFrame) -> Checks | None:
     """Harmonics of both lasers' readings, without those due to the table; None if only the fundamental was fitted."""
-    fitted = min((cycle.coefficients.shape[0] - 1) // 2 for cycle in cycles)
+    fitted = min(cycle.fitted for cycle in cycles)
     if fitted < 2:
         return None
     table = np.array([cycle.harmonics(ACCELERATION)[1:fitted] for cycle in cycles]).mean(axis=0)

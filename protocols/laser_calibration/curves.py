@@ -112,7 +112,7 @@ def mean_pass(cycles: Sequence[Cycle], omega: float) -> Pass:
         speed=omega * waves.rates[:, DISPLACEMENT],
         lasers=(waves.waveform[:, LASER_1], waves.waveform[:, LASER_2]),
         ratio=float(np.ptp(waves.waveform[:, DISPLACEMENT]) / np.ptp(displaced)),
-        harmonics=min((cycle.coefficients.shape[0] - 1) // 2 for cycle in cycles),
+        harmonics=min(cycle.fitted for cycle in cycles),
     )
 
 
@@ -131,22 +131,21 @@ def fit_curve(passes: Sequence[Pass], laser: int, rest: float) -> ErrorCurve:
     # the range that all passes cover
     low, high = max(float(r.min()) for r in readings), min(float(r.max()) for r in readings)
     highest = max(min(HIGHEST, min(each.harmonics for each in passes) - 1), 1)
-    rows = [_columns(r, each, low, high, highest) for r, each in zip(readings, passes, strict=True)]
-    errors = [r - each.displacement for r, each in zip(readings, passes, strict=True)]
+    rows = [_rows(r, each, low, high, highest) for r, each in zip(readings, passes, strict=True)]
     every = range(len(passes))
     # the triangular factor of each pass has the same solutions as its rows, which are ten times as many
-    factors = [
-        np.linalg.qr(np.column_stack((columns, error)), mode="r") for columns, error in zip(rows, errors, strict=True)
-    ]
+    factors = [np.linalg.qr(each, mode="r") for each in rows]
+
+    def columns(order: int) -> list[int]:
+        return [*range(order + 1), -3, -2]
 
     def solved(order: int, out: int | None = None) -> Array:
-        kept = [*range(order + 1), -3, -2]
         reduced = np.concatenate([factors[k] for k in every if k != out])
-        found, *_ = np.linalg.lstsq(reduced[:, kept], reduced[:, -1], rcond=None)
+        found, *_ = np.linalg.lstsq(reduced[:, columns(order)], reduced[:, -1], rcond=None)
         return found.astype(np.float64)
 
     def missed(order: int, out: int) -> float:
-        wrong = errors[out] - rows[out][:, [*range(order + 1), -2, -1]] @ solved(order, out)
+        wrong = rows[out][:, -1] - rows[out][:, columns(order)] @ solved(order, out)
         # the variance excludes the mean, since quantisation shifts the zero differently in each pass
         return float(np.var(wrong))
 
@@ -154,6 +153,7 @@ def fit_curve(passes: Sequence[Pass], laser: int, rest: float) -> ErrorCurve:
     means = squares.mean(axis=1)
     order = int(means.argmin()) + 1
     whole, finest = solved(order), solved(highest)
+    # beyond the highest order nothing is known: its own contribution stands for what may be missing
     coarser = whole if order < highest else solved(max(highest - 1, 1))
     alone: Array = np.array([solved(order, out) for out in every])
     at = np.linspace(-1.0, 1.0, READINGS)
@@ -169,10 +169,10 @@ def fit_curve(passes: Sequence[Pass], laser: int, rest: float) -> ErrorCurve:
     )
 
 
-def _columns(readings: Array, each: Pass, low: float, high: float, highest: int) -> Array:
-    """Columns of the fit, shape (k, highest + 3): Chebyshev polynomials up to the order `highest`, delay, and
-    compliance of the clamps.
+def _rows(readings: Array, each: Pass, low: float, high: float, highest: int) -> Array:
+    """Equations of the fit, shape (k, highest + 4): Chebyshev polynomials up to the order `highest`, delay, compliance
+    of the clamps, and the error.
     """
     place = (2.0 * readings - high - low) / (high - low)
-    columns = (chebyshev.chebvander(place, highest), -each.speed, each.omega**2 * each.displacement)
-    return np.column_stack(columns).astype(np.float64)
+    terms = (chebyshev.chebvander(place, highest), -each.speed, each.omega**2 * each.displacement)
+    return np.column_stack((*terms, readings - each.displacement)).astype(np.float64)

@@ -121,7 +121,8 @@ def seismic(
     error.
     """
     cases = [Case(f"{each:g} periods", waves=(each, each)) for each in periods]
-    for case in cases or [CASES["default"], *([] if checked else [CASES["calibrated"]])]:
+    known = ["default"] if checked else ["default", "calibrated"]
+    for case in cases or [CASES[each] for each in known]:
         print(f"\n{case.name}")
         for beta in betas:
             rows = [measured(seed, name, beta, case, checked=checked) for seed in range(trials)]

@@ -65,7 +65,7 @@ OF_CALIBRATION = {
 found, and the order is the best one instead of the lowest that is hardly worse. A value may differ by half the
 uncertainty that the first edition stated, given for each."""
 
-OF_CALIBRATION_LESS = {"scale_uncertainty": 1.0, "delay_uncertainty_s": 1.5, "residual_m": 1.5, "order": 7.0}
+OF_CALIBRATION_RATIOS = {"scale_uncertainty": 1.0, "delay_uncertainty_s": 1.5, "residual_m": 1.5, "order": 7.0}
 """Of a calibrated sensor: largest ratio to the value of the first edition. The uncertainty of a laser's scale was twice
 as large as it should be, and is a part of that of the table."""
 
@@ -146,15 +146,18 @@ def differences(old: object, new: object, where: str = "", rounded: Mapping[str,
         yield f"{where} was {old!r} and is {new!r}"
 
 
-def _otherwise_calibrated(old: Mapping[str, float | None], new: Mapping[str, Any], where: str) -> Iterator[str]:
+def _otherwise_calibrated(old: Mapping[str, Any], new: Mapping[str, Any], where: str) -> Iterator[str]:
     """Values of a calibrated sensor that differ by more than they may."""
-    allowed = {key: 0.5 * (old[limit] or 0.0) for key, limit in OF_CALIBRATION.items()}
     for key, was in old.items():
-        if was is None or key not in allowed.keys() | OF_CALIBRATION_LESS.keys():
+        now = new[key]
+        if was is None:
             continue
-        bounds = (was - allowed[key], was + allowed[key]) if key in allowed else (0.0, OF_CALIBRATION_LESS[key] * was)
-        if not bounds[0] <= new[key] <= bounds[1]:
-            yield f"{where}.{key} was {was!r} and is {new[key]!r}"
+        if key in OF_CALIBRATION:
+            allowed = abs(now - was) <= 0.5 * (old[OF_CALIBRATION[key]] or 0.0)
+        else:
+            allowed = key not in OF_CALIBRATION_RATIOS or 0.0 <= now <= OF_CALIBRATION_RATIOS[key] * was
+        if not allowed:
+            yield f"{where}.{key} was {was!r} and is {now!r}"
 
 
 def _is_check_line(value: object) -> bool:
@@ -165,6 +168,6 @@ def _changed(old: Mapping[str, object]) -> tuple[str, ...]:
     """What is evaluated otherwise today, of a gain, a line of a check, or a calibrated sensor."""
     if _is_check_line(old):
         return OF_DELAY if str(old["what"]).startswith("delay ") else OF_CHECK
-    return (
-        INTERVALS if "alpha_2" in old else (*OF_CALIBRATION, *OF_CALIBRATION_LESS) if "scale_uncertainty" in old else ()
-    )
+    if "scale_uncertainty" in old:
+        return (*OF_CALIBRATION, *OF_CALIBRATION_RATIOS)
+    return INTERVALS if "alpha_2" in old else ()

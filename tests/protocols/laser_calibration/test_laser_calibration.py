@@ -342,22 +342,28 @@ def test_the_clamps_are_removed_when_a_laser_has_no_reading() -> None:
     assert asked == [OperatorTask.LOCK_FRAME, OperatorTask.UNLOCK_FRAME]
 
 
+def simulated_error(laser: int, seed: int, periods: float, place: np.ndarray) -> np.ndarray:
+    """Error [m] of a laser of the simulated bench. Its phase is drawn from the bench's seed, and read back here from
+    its stream.
+    """
+    draws = np.random.default_rng(SeedSequence(seed).spawn(7)[3 + laser])
+    draws.uniform()
+    return 0.0008 * RANGE * np.sin(2.0 * np.pi * periods * place / RANGE + draws.uniform(0.0, 2.0 * np.pi))
+
+
 def test_a_calibration_on_the_simulated_bench_agrees_with_its_lasers_and_serves_other_runs(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The waves of the virtual lasers are drawn from the bench's seed; here they are read back from its streams."""
     out, blocks = tmp_path / "out", tmp_path / "blocks.toml"
     blocks.write_text("[acquisition]\nblock_duration = 0.2\n", encoding="utf-8")
     command = ["run", "laser-calibration", "--seed", "5", "--cycles", "4", "--passes", "6", "--config", str(blocks)]
     assert main([*command, "--out", str(out)]) == 0
     one = read_calibration(out / "laser_calibration.json")
-    spans = []
     x = np.array([-0.045, 0.045])
-    for number, source in enumerate(SeedSequence(5).spawn(7)[3:5]):
-        draws = np.random.default_rng(source)
-        draws.uniform()
-        shown = x + 0.0008 * RANGE * np.sin(2.0 * np.pi * 1.5 * x / RANGE + draws.uniform(0.0, 2.0 * np.pi))
-        spans.append(float(np.diff(one.lasers[number].corrected(shown))[0]) / 0.09)
+    spans = [
+        float(np.diff(one.lasers[number].corrected(x + simulated_error(number, 5, 1.5, x)))[0]) / 0.09
+        for number in range(2)
+    ]
     # three standard uncertainties of a difference, of which both curves and the differential scale are parts
     assert abs(spans[1] - spans[0]) < 3.0 * one.differential_uncertainty
     assert abs(0.5 * sum(spans) - 1.0) < 3.0 * one.table_uncertainty
@@ -389,11 +395,9 @@ def test_an_error_with_short_waves_is_found(tmp_path: Path) -> None:
     command = ["run", "laser-calibration", "--seed", "5", "--cycles", "4", "--passes", "6", "--config", str(bench)]
     assert main([*command, "--out", str(out)]) == 0
     one = read_calibration(out / "laser_calibration.json")
-    for curve, source in zip(one.lasers, SeedSequence(5).spawn(7)[3:5], strict=True):
-        draws = np.random.default_rng(source)
-        draws.uniform()
+    for laser, curve in enumerate(one.lasers):
         x = np.linspace(curve.lowest, curve.highest, 401)
-        bent = 0.0008 * RANGE * np.sin(2.0 * np.pi * periods * x / RANGE + draws.uniform(0.0, 2.0 * np.pi))
+        bent = simulated_error(laser, 5, periods, x)
         remaining = curve.corrected(x + bent) - x
         remaining -= np.polynomial.Polynomial.fit(x, remaining, 1)(x)
         assert bent.std() > 1e-4
