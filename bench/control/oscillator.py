@@ -86,6 +86,9 @@ Array = NDArray[np.float64]
 _Factors = list[tuple[int, NDArray[np.complex128]]]
 """Orders of harmonics and their complex amplitudes [V]."""
 
+_AHEAD = 8
+"""Number of blocks of a held sine that are computed together, in a quarter of the time of single blocks."""
+
 
 class Oscillator:
     """Converts target acceleration to drive voltage, block by block."""
@@ -102,10 +105,12 @@ class Oscillator:
         self._into = 0  # number of samples of the first sweep already played
         self._amplitude, self._omega, self._phase = 0.0, tau, 0.0
         self._shares = ShareRamp()
+        self._ahead: deque[Array] = deque()  # next blocks of the held sine, until a command changes it
 
     def use(self, calibration: DriveCalibration) -> None:
         """Use the response of `calibration` from the next sample on."""
         self._calibration = calibration
+        self._ahead.clear()
 
     @property
     def amplitude(self) -> float:
@@ -121,12 +126,14 @@ class Oscillator:
         """Append a sweep; the harmonics of the previous sine fade out over one cycle."""
         self._shares.to_pure(self._cycle)
         self._sweeps.append(sweep)
+        self._ahead.clear()
 
     def trim(self, shares: tuple[complex, ...], blend: float = 1.0, wait: int = 0) -> None:
         """Change to these `shares` of the fundamental, second harmonic and so on, within `blend` cycles of the current
         frequency, beginning after `wait` samples.
         """
         self._shares.to(shares, round(blend * self._cycle), wait)
+        self._ahead.clear()
 
     @property
     def phase(self) -> float:
@@ -159,7 +166,7 @@ class Oscillator:
         length = self._length(sweep)
         n = min(n, length - self._into)
         t = np.arange(self._into + 1, self._into + n + 1) / self._rate
-        volts = self._drive(sweep.amplitude_at(t), sweep.omega_at(t), self._phase + sweep.phase_at(t))
+        volts = self._drive(sweep.amplitude_at(t), sweep.omega_at(t), self._phase + sweep.phase_at(t), self._shares.next(n))
         self._into += n
         if self._into == length:
             self._phase = (self._phase + float(sweep.phase_at(np.array(length / self._rate)))) % tau
@@ -169,18 +176,38 @@ class Oscillator:
         return volts
 
     def _held(self, n: int) -> Array:
-        step = self._omega / self._rate
-        phase: Array = self._phase + step * np.arange(1, n + 1, dtype=np.float64)
-        self._phase = (self._phase + step * n) % tau
         if self._amplitude == 0.0:
-            return np.zeros(n)
-        return self._drive(np.array(self._amplitude), np.array(self._omega), phase)
+            volts = np.zeros(n)
+        elif self._shares.constant:
+            if not self._ahead or self._ahead[0].size != n:
+                self._ahead = deque(self._held_blocks(_AHEAD, n, self._shares.next(n)))
+            else:
+                self._shares.next(n)
+            volts = self._ahead.popleft()
+        else:
+            (volts,) = self._held_blocks(1, n, self._shares.next(n))
+        self._phase = self._after(self._phase, n)
+        return volts
 
-    def _drive(self, amplitude: Array, omega: Array, phase: Array) -> Array:
-        """Drive [V] at `phase` [rad], shape (n,); `amplitude` and `omega` have that shape or are scalars."""
+    def _held_blocks(self, blocks: int, n: int, shares: NDArray[np.complex128]) -> Array:
+        """The next samples of the held sine [V], shape (blocks, n); several blocks only with constant shares."""
+        starts = [self._phase]
+        while len(starts) < blocks:
+            starts.append(self._after(starts[-1], n))
+        phase: Array = np.add.outer(starts, self._omega / self._rate * np.arange(1, n + 1, dtype=np.float64))
+        volts = self._drive(np.array(self._amplitude), np.array(self._omega), phase.ravel(), shares)
+        return volts.reshape(blocks, n)
+
+    def _after(self, phase: float, n: int) -> float:
+        """Phase of the held sine [rad], `n` samples after `phase`."""
+        return (phase + self._omega / self._rate * n) % tau
+
+    def _drive(self, amplitude: Array, omega: Array, phase: Array, shares: NDArray[np.complex128]) -> Array:
+        """Drive [V] at `phase` [rad], shape (n,); `amplitude` and `omega` have that shape or are scalars, and `shares`
+        the shape (n, HARMONICS) or (1, HARMONICS).
+        """
         if self._calibration is None:
             raise RuntimeError("the drive must be calibrated before the oscillator moves the table")
-        shares = self._shares.next(phase.size)
         power = turn = np.exp(1j * phase)
         volts, order = np.zeros(phase.size), 1
         for k, factor in self._factors(self._calibration, amplitude, omega, shares):

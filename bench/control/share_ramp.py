@@ -41,6 +41,11 @@ class ShareRamp:
         if self._waiting or not np.array_equal(self._to, _pure()):
             self.to((1.0,), samples)
 
+    @property
+    def constant(self) -> bool:
+        """Whether the shares remain as they are until the next command."""
+        return not self._waiting and self._done >= self._length
+
     def next(self, n: int) -> NDArray[np.complex128]:
         """Shares at the next `n` samples, shape (n, HARMONICS), or (1, HARMONICS) while they are constant."""
         if not self._waiting or self._waiting[0][0] >= self._played + n:
