@@ -33,7 +33,7 @@ SOURCES: Mapping[str, Source] = {
     LINEARITY: Source("B", "data sheet or calibration, constrained by the test of the bare frame", _CALIBRATE),
     SCALES: Source("B", "assumed difference between the lasers' scales, or calibration", _CALIBRATE),
     TIMING: Source("B", "assumed wander of the delay: one measuring period", _FASTER),
-    STEPS: Source("B", "resolution of the lasers", _FINER),
+    STEPS: Source("B", "resolution of the lasers; of calibrated ones, what a correction leaves", _FINER),
     "scatter of the cycles": Source("A", "measured cycles, with their correlation", "measure more cycles"),
     "remaining transient": Source("A", "decay fitted to the measured cycles", "wait longer before measuring"),
     "amplitude of the table": Source(

@@ -29,7 +29,7 @@ _GRID = 256
 _ANGLES: NDArray[np.float64] = np.arange(_GRID, dtype=np.float64) * (tau / _GRID)
 
 
-def _basis(phase: NDArray[np.float64], harmonics: int) -> NDArray[np.float64]:
+def harmonic_basis(phase: NDArray[np.float64], harmonics: int) -> NDArray[np.float64]:
     """Columns 1, cos(k phase) and sin(k phase) for k = 1 to harmonics; shape (n, 1 + 2 harmonics)."""
     turns = np.exp(1j * phase)
     powers = np.cumprod(np.broadcast_to(turns[:, None], (phase.size, harmonics)), axis=1)
@@ -41,8 +41,8 @@ def _basis(phase: NDArray[np.float64], harmonics: int) -> NDArray[np.float64]:
 
 @lru_cache(maxsize=HARMONICS)
 def _period(harmonics: int) -> NDArray[np.float64]:
-    """`_basis` at `_GRID` equally spaced phases of one period."""
-    return _basis(_ANGLES, harmonics)
+    """`harmonic_basis` at `_GRID` equally spaced phases of one period."""
+    return harmonic_basis(_ANGLES, harmonics)
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class Cycle:
     is the largest magnitude of the smoothed samples. It replaces `peak` for an unsteady motion, which the fit
     overshoots because the motion differs between the two ends of the cycle. `traces` [m], shape (n, 3), are all samples
     of the drift and of both lasers, missing ones interpolated; no rows if there are no such signals. `first` is the
-    index of the first sample, counted like the phase.
+    index of the first sample, counted like the phase, and `phases` [rad] are its phase and the phase between samples.
     """
 
     index: int
@@ -67,6 +67,7 @@ class Cycle:
     noise: NDArray[np.float64]
     traces: NDArray[np.float32]
     first: int = 0
+    phases: tuple[float, float] = (0.0, 0.0)
 
     @property
     def fitted(self) -> int:
@@ -94,13 +95,14 @@ def fit_cycle(
     """
     finite = np.isfinite(values)
     share, traces = 1.0, _traces(values, finite)
+    phases = float(phase[0]), float(phase[1] - phase[0])
     if not finite.all():
         valid = finite.all(axis=1)
         phase, values, share = phase[valid], values[valid], valid.mean()
     harmonics = min(highest, (phase.size - 1) // 4)
     if share < COMPLETE or harmonics < 1:
         return None
-    basis = _basis(phase, harmonics)
+    basis = harmonic_basis(phase, harmonics)
     coefficients: NDArray[np.float64] = np.linalg.solve(basis.T @ basis, basis.T @ values).astype(np.float64)
     residual = values - basis @ coefficients
     waveform = _period(harmonics) @ coefficients
@@ -114,6 +116,7 @@ def fit_cycle(
         noise=np.sqrt(np.mean(residual**2, axis=0)),
         traces=traces,
         first=first,
+        phases=phases,
     )
 
 

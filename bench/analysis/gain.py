@@ -1,7 +1,8 @@
 """Gain coefficient from measured cycles, with its uncertainty (GUM, and Monte Carlo method of GUM Supplement 1)."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from math import hypot, inf, sqrt, tau
 
 import numpy as np
@@ -12,6 +13,7 @@ from bench.analysis.error_curve import Checks, Harmonics
 from bench.analysis.linearity import LinearFrame
 from bench.analysis.remaining_transient import remaining_transient
 from bench.analysis.rounding import FittedPeak
+from bench.analysis.rounding_correction import MODEL, rounding
 from bench.analysis.sensor_accuracy import Draws, PeakReadings, SensorUncertainty, Shapes
 from bench.analysis.sensor_accuracy import SensorAccuracy as SensorAccuracy
 from bench.analysis.signals import ACCELERATION, DRIFT, LASER_1, LASER_2, U1
@@ -52,7 +54,8 @@ class SteadyPeak:
     cycles. `u1` [m] is the first storey's peak, `amplitude` [m/s2] the amplitude of the table's acceleration and
     `harmonics` the relative rms of its harmonics. `readings` are the lasers' readings at the peak, `cycles` is the
     number of cycles, and `checks` holds the harmonics of both lasers' readings in a test of the bare frame. `freedom`
-    is the number of degrees of freedom of the scatter.
+    is the number of degrees of freedom of the scatter. `used` are the cycles of which it is the peak, from which
+    `without_rounding` corrects it; none for the peak of single cycles.
     """
 
     drift: float
@@ -66,6 +69,7 @@ class SteadyPeak:
     checks: Checks | None = None
     freedom: float = inf
     noise: float = 0.0
+    used: tuple[Cycle, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -117,7 +121,29 @@ def steady_peak(
         cycles=len(cycles),
         checks=None if frame is None else _checks(cycles, waves, omega, frame),
         freedom=freedom,
+        used=tuple(cycles),
     )
+
+
+@lru_cache(maxsize=64)
+def without_rounding(peak: SteadyPeak, omega: float, step: float) -> SteadyPeak:
+    """A peak at `omega` [rad/s], without the rounding errors of the lasers' outputs with steps of `step` [m], for each
+    laser whose errors can be estimated. This takes 0.1 s, so it must not be called while the table is driven.
+    """
+    readings, fitted = peak.readings, peak.readings.fitted
+    if fitted is None or not peak.used:
+        return peak
+    errors, remaining = [0.0, 0.0], list(fitted.variances(step))
+    for laser, column in enumerate((LASER_1, LASER_2)):
+        found = rounding(peak.used, omega, column, fitted.phase, fitted.orders, step)
+        if found is not None:
+            errors[laser] = found.error
+            remaining[laser] = found.variance + MODEL**2 * remaining[laser]
+    first, second = errors
+    drift = peak.drift - readings.sign * (second - first)
+    lasers = readings.lasers[0] - first, readings.lasers[1] - second
+    fitted = replace(fitted, remaining=(remaining[0], remaining[1]))
+    return replace(peak, drift=drift, readings=replace(readings, drift=drift, lasers=lasers, fitted=fitted))
 
 
 def _readings(cycles: Sequence[Cycle], waves: Waves, omega: float, drift: float) -> PeakReadings:

@@ -39,20 +39,24 @@ class FittedPeak:
     """Peak of the mean of fitted cycles, from the harmonics 1 to `orders` of both lasers' readings.
 
     `harmonics` [m], shape (2, cycles, 1 + H), are the mean and the complex amplitudes c_k of the readings of laser 1
-    and 2, which are Re(sum of c_k exp(j k phase)) in each cycle; `phase` [rad] is that of the peak.
+    and 2, which are Re(sum of c_k exp(j k phase)) in each cycle; `phase` [rad] is that of the peak. `remaining`, shape
+    (2,), are the variances [m2] of the peak after a correction of the rounding errors, None without one.
     """
 
     harmonics: NDArray[np.complex128]
     phase: float
     orders: int
+    remaining: tuple[float, float] | None = None
     _variances: dict[float, tuple[float, float]] = field(
         default_factory=dict[float, tuple[float, float]], init=False, repr=False
     )
 
     def variances(self, step: float) -> tuple[float, float]:
         """Variances [m2] of the peak due to rounding of the readings of laser 1 and of laser 2 to multiples of `step`
-        [m].
+        [m], or those that remain.
         """
+        if self.remaining is not None:
+            return self.remaining
         if step not in self._variances:
             cycles, highest = self.harmonics.shape[1], self.harmonics.shape[2] - 1
             n = max(PLACES // cycles, 4 * highest)

@@ -166,7 +166,9 @@ class Oscillator:
         length = self._length(sweep)
         n = min(n, length - self._into)
         t = np.arange(self._into + 1, self._into + n + 1) / self._rate
-        volts = self._drive(sweep.amplitude_at(t), sweep.omega_at(t), self._phase + sweep.phase_at(t), self._shares.next(n))
+        volts = self._drive(
+            sweep.amplitude_at(t), sweep.omega_at(t), self._phase + sweep.phase_at(t), self._shares.next(n)
+        )
         self._into += n
         if self._into == length:
             self._phase = (self._phase + float(sweep.phase_at(np.array(length / self._rate)))) % tau

@@ -1,12 +1,12 @@
 """Comparison of a measured dwell with the prediction."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import hypot, log
 from typing import Any
 
 from bench.analysis.free_motion import FreeMotion, Rate
-from bench.analysis.gain import Gain, SteadyPeak, gain
+from bench.analysis.gain import Gain, SteadyPeak, gain, without_rounding
 from bench.analysis.sensor_accuracy import SensorUncertainty
 from bench.analysis.uncertainty import plus_minus
 from bench.prediction.bands import expanded_uncertainty
@@ -51,6 +51,13 @@ class Conditions:
     sensors: SensorUncertainty
     shaker: Shaker | None = None
     harmonics: int = 1
+
+    def corrected(self, peak: SteadyPeak) -> SteadyPeak:
+        """The peak without the rounding errors of calibrated lasers; of others, the linearity errors are larger."""
+        step = self.sensors.accuracy.laser_resolution
+        if self.sensors.calibration is None or step == 0.0:
+            return peak
+        return without_rounding(peak, self.omega, step)
 
     def branches(self, peak: SteadyPeak) -> dict[str, Branch]:
         """Predicted branches at the measured amplitudes of the table."""
@@ -118,8 +125,10 @@ def judge(settled: Settled, conditions: Conditions, starts: int, held: Held | No
 
     If the motion is not steady or the orbit is unstable, stability is also predicted on the table. If the motion was
     then `held` on the rocking orbit, gain and comparison are for the held motion, and the free motion is described in
-    addition.
+    addition. Peaks measured by calibrated lasers are corrected, which takes up to half a second.
     """
+    conditions = replace(conditions, reference=_corrected(conditions.reference, conditions))
+    settled = _corrected(settled, conditions)
     peak, bare, shaker = settled.peak, conditions.reference.peak, conditions.shaker
     branches = conditions.branches(peak)
     steady = settled.steadiness.steady
@@ -158,9 +167,14 @@ def judge(settled: Settled, conditions: Conditions, starts: int, held: Held | No
     return point if held is None else _held_point(point, held, conditions)
 
 
+def _corrected(settled: Settled, conditions: Conditions) -> Settled:
+    """A dwell with its corrected peak if it is steady; the peaks of other motions are those of single cycles."""
+    return replace(settled, peak=conditions.corrected(settled.peak)) if settled.steadiness.steady else settled
+
+
 def _held_point(free: HarmonicPoint, held: Held, conditions: Conditions) -> HarmonicPoint:
     """The point of a free motion that was then held; if it was not held on the orbit, only a remark is added."""
-    peak = held.peak
+    peak = None if held.peak is None else conditions.corrected(held.peak)
     if peak is None:
         released = f"the hold of the motion on its orbit was released after cycle {held.cycles}"
         text = f"{released if held.cycles else 'the motion could not be held on its orbit'}: {held.reason}"
