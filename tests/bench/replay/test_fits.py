@@ -17,7 +17,9 @@ from bench.results import FILE
 @pytest.fixture(scope="module")
 def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("fits") / "run"
-    assert main(["run", "free-vibration", "--yes", "--json", "--out", str(folder), "--seed", "2"]) == 0
+    assert (
+        main(["run", "free-vibration", "--repeats", "2", "--yes", "--json", "--out", str(folder), "--seed", "2"]) == 0
+    )
     return folder / FILE
 
 
