@@ -2,8 +2,10 @@
 
 from bench.analysis.signals import SignalMap
 from bench.config.model import BenchConfiguration
+from bench.engine.at_rest import AtRest
+from bench.engine.drives import PreparedDrive, SineDrive
 from bench.engine.interface import Ended, Ending, EventStream, Operator, Requests
-from bench.engine.loop import AtRest, Loop, PreparedDrive, SineDrive
+from bench.engine.loop import Loop
 from bench.engine.output import Output
 from bench.engine.stalls import Stalls
 from bench.engine.steps import (

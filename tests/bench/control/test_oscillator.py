@@ -190,3 +190,30 @@ def test_a_later_command_replaces_changes_that_have_not_begun() -> None:
     oscillator.trim((1.4,), wait=900)
     oscillator.trim((1.0,), wait=0)
     np.testing.assert_array_equal(oscillator.next(2000), plain.next(2000))
+
+
+COMMANDS = {
+    "calibration": lambda oscillator: oscillator.use(DriveCalibration.flat(3.0 + 1.0j)),
+    "harmonics": lambda oscillator: oscillator.trim((1.0, 0.1j), blend=0.2),
+    "later harmonics": lambda oscillator: oscillator.trim((1.0, 0.1j), blend=0.2, wait=150),
+    "sweep": lambda oscillator: oscillator.follow(sweeps([Segment(0.3, 0.6, 20.0)], 0.4, 16.0)[0]),
+}
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_command_acts_on_the_next_block_although_blocks_are_computed_together(command: str) -> None:
+    """Of two oscillators, one computes every block by itself, since the next one has another size."""
+    together, single = _oscillator(), _oscillator()
+    for oscillator in (together, single):
+        oscillator.next(5500)
+    expected, pieces = list[np.ndarray](), list[np.ndarray]()
+    for block in range(20):
+        if block == 3:
+            COMMANDS[command](together)
+            COMMANDS[command](single)
+        pieces.append(together.next(100))
+        expected += [single.next(60), single.next(40)]
+    np.testing.assert_allclose(np.concatenate(pieces), np.concatenate(expected), rtol=0, atol=1e-12)
+    unchanged = _oscillator()
+    unchanged.next(5500)
+    assert np.abs(np.concatenate(pieces) - unchanged.next(2000)).max() > 1e-2
