@@ -94,8 +94,7 @@ def fit_cycle(
     there are few samples. Returns None if too many samples are missing (NaN) or there are too few for one harmonic.
     """
     finite = np.isfinite(values)
-    share, traces = 1.0, _traces(values, finite)
-    phases = float(phase[0]), float(phase[1] - phase[0])
+    share, traces, every = 1.0, _traces(values, finite), phase
     if not finite.all():
         valid = finite.all(axis=1)
         phase, values, share = phase[valid], values[valid], valid.mean()
@@ -116,7 +115,7 @@ def fit_cycle(
         noise=np.sqrt(np.mean(residual**2, axis=0)),
         traces=traces,
         first=first,
-        phases=phases,
+        phases=(float(every[0]), float(every[1] - every[0])),
     )
 
 

@@ -98,3 +98,8 @@ def test_cycles_with_different_numbers_of_harmonics_have_a_mean() -> None:
     assert found.waveform.shape == expected.waveform.shape
     np.testing.assert_allclose(found.peaks, expected.peaks, rtol=1e-6)
     np.testing.assert_allclose(found.harmonics, 0.15, rtol=1e-6)
+
+
+@pytest.mark.parametrize("samples", [0, 1, 4])
+def test_too_few_samples_for_one_harmonic_have_no_fit(samples: int) -> None:
+    assert fit_cycle(0, np.arange(float(samples)), np.ones((samples, 1))) is None
