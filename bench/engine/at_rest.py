@@ -9,11 +9,7 @@ from bench.analysis.fall import FallWatch
 from bench.analysis.signals import scatter
 from bench.engine.interface import EventStream
 from bench.engine.loop import Loop
-from bench.engine.steps import (
-    AcquireAtRest,
-    Arm,
-    RestSamples,
-)
+from bench.engine.steps import AcquireAtRest, Arm, RestSamples
 from bench.events import State, Warned
 from bench.guard.guard import Guard
 from bench.guard.limits import Violation
