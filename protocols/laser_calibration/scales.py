@@ -1,8 +1,8 @@
 """Scales of lasers and table sensors from the error curves of a calibration.
 
-The lasers are the length standard: their scale error over the span of the passes follows from the linearity error on
-their data sheets, which is assumed to be smaller than the scale error of the table's sensors. The table's sensors and
-each laser are therefore compared with the mean span of both lasers.
+The standard of length is the weighted mean (`protocols.laser_calibration.standards`) of the mean span of both lasers,
+whose scale error over the passes follows from the linearity error on their data sheets, and of the span computed from
+the accelerometer, which has less weight.
 """
 
 from collections.abc import Sequence
@@ -18,6 +18,7 @@ from bench.analysis.uncertainty import COVERAGE
 from bench.config.model import BenchConfiguration
 from protocols.common.calibrate import Unmeasurable
 from protocols.laser_calibration.curves import ErrorCurve, Pass, jackknife
+from protocols.laser_calibration.standards import IMPLAUSIBLE, standards
 
 Array = NDArray[np.float64]
 
@@ -40,8 +41,12 @@ def calibration(
     and `ranges` [m] are taken from the lasers' data sheets.
     """
     slopes = [curve.slope for curve in curves]
-    # ratio of the true displacement (mean span of the lasers) to the one measured by the table's sensor
-    factor = 1.0 / (1.0 - 0.5 * sum(slopes))
+    by_lasers = 1.0 / (1.0 - 0.5 * sum(slopes))
+    ratios = np.array([each.ratio for each in passes])
+    standard = standards(curves, accuracy, ranges)
+    corrected, uncertainty = standard.combined(by_lasers * float(ratios.mean()))
+    # ratio of the true displacement to that measured by the table's sensor
+    factor = by_lasers * corrected
     found = [
         LaserCurve(
             sensor=device,
@@ -57,10 +62,8 @@ def calibration(
         for curve, rest, device, slope in zip(curves, rests, devices, slopes, strict=True)
     ]
     span = _span(curves)
-    ratios = np.array([each.ratio for each in passes])
-    apart = _difference_uncertainty(curves, accuracy, ranges)
-    # two standards that disagree by more than they should leave half of the excess to their mean
-    excess = 0.5 * sqrt(max((slopes[1] - slopes[0]) ** 2 - (COVERAGE * apart) ** 2, 0.0))
+    # two lasers that disagree by more than they should leave half of the excess to their mean
+    excess = 0.5 * sqrt(max((slopes[1] - slopes[0]) ** 2 - (COVERAGE * standard.apart) ** 2, 0.0))
     scatter = np.hypot(np.std(ratios, ddof=1) / sqrt(len(passes)), jackknife((curves[0].slopes + curves[1].slopes) / 2))
     # an error due to higher orders at both ends, as large as at any reading
     bent = sqrt(2.0) * np.hypot(curves[0].residual, curves[1].residual) / span
@@ -74,12 +77,9 @@ def calibration(
         common_linearity=reference_linearity * span,
         table_displacement=factor,
         table_acceleration=factor * float(ratios.mean()),
-        table_uncertainty=hypot(0.5 * apart, excess, scatter),
+        table_uncertainty=hypot(uncertainty, excess, scatter),
     )
 
-
-IMPLAUSIBLE = 3.0
-"""Ratio of a difference between scales to its standard uncertainty above which an error of a sensor is likely."""
 
 DISAGREE = 0.05
 """Largest relative difference between the spans of two lasers that measure the same motion; a larger one is no error of
@@ -101,16 +101,15 @@ def disagreements(
     found: LaserCalibration, curves: tuple[ErrorCurve, ErrorCurve], configuration: BenchConfiguration
 ) -> list[str]:
     """Remarks on sensors whose scales differ by more than `IMPLAUSIBLE` times the uncertainty of their difference."""
-    accuracy = configuration.analysis
-    apart = _difference_uncertainty(curves, accuracy, configuration.laser_ranges)
+    standard = standards(curves, configuration.analysis, configuration.laser_ranges)
     lasers, remarks = curves[1].slope - curves[0].slope, list[str]()
-    if abs(lasers) > (bound := IMPLAUSIBLE * apart):
+    if abs(lasers) > (bound := IMPLAUSIBLE * standard.apart):
         remarks.append(
             f"the spans of the two lasers differ by {100.0 * lasers:+.2f} %, more than their data sheets allow "
             f"({100.0 * bound:.2f} %): check their ranges and the load resistors of analogue outputs; the uncertainty "
             "of the table's scale contains the difference"
         )
-    bound = IMPLAUSIBLE * hypot(0.5 * apart, accuracy.table_scale)
+    bound = IMPLAUSIBLE * hypot(standard.lasers, standard.table)
     for name, factor in (("displacement", found.table_displacement), ("acceleration", found.table_acceleration)):
         if abs(factor - 1.0) > bound:
             remarks.append(
@@ -120,27 +119,9 @@ def disagreements(
     return remarks
 
 
-def _difference_uncertainty(
-    curves: tuple[ErrorCurve, ErrorCurve], accuracy: SensorAccuracy, ranges: tuple[float, float]
-) -> float:
-    """Relative standard uncertainty of the difference between the spans of the two lasers, from their data sheets; that
-    of the mean of both is half of it.
-    """
-    return hypot(*(_span_uncertainty(_span(curves), accuracy, whole) for whole in ranges))
-
-
 def _span(curves: tuple[ErrorCurve, ErrorCurve]) -> float:
     """Span of the readings that both lasers cover [m]."""
     return min(curve.high - curve.low for curve in curves)
-
-
-def _span_uncertainty(span: float, accuracy: SensorAccuracy, whole: float) -> float:
-    """Relative standard uncertainty of a `span` [m] measured by one laser with the range `whole` [m].
-
-    The variance due to the scale is half that of the difference between two lasers. Since the shape of the linearity
-    error is unknown, the errors at the two ends of the span are assumed independent, each with the variance of a sine.
-    """
-    return float(np.hypot(accuracy.laser_linearity * whole / span, accuracy.laser_mismatch / sqrt(2.0)))
 
 
 def _rescaled(curve: ErrorCurve, factor: float) -> Array:

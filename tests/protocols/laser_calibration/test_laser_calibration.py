@@ -126,11 +126,13 @@ def test_a_laser_that_does_not_follow_the_table_is_not_calibrated(scale: float) 
 def test_known_errors_are_found_with_their_delay_and_without_what_the_clamps_yield(noise: float) -> None:
     one = found(noise)
     places = np.linspace(-0.045, 0.045, 91)
-    # the mean of both lasers is the standard: what both have in common stays
+    # the standard is the mean of both lasers, and with less weight the accelerometer: what both have in common stays
     smallest = made_pass(8.0, 0.05 * 0.93, np.random.default_rng(1), 0.0).displacement / DISPLACEMENT_SHOWS
     ends = np.array([smallest.min(), smallest.max()])
     spans = [1.0 + float(np.diff(error(k, ends + RESTS[k]))[0] / np.diff(ends)[0]) for k in range(2)]
-    common = 0.5 * sum(spans) - 1.0
+    share = (one.table_uncertainty / SensorAccuracy().table_scale) ** 2
+    lasers, accelerometer = 0.5 * sum(spans) - 1.0, 0.001
+    common = (1.0 - share) * lasers + share * accelerometer
     both = [left(one, k, places + RESTS[k]) for k in range(2)]
     for k in range(2):
         assert np.abs(both[k] - common * places).max() < 1.5e-6 + noise
@@ -140,7 +142,7 @@ def test_known_errors_are_found_with_their_delay_and_without_what_the_clamps_yie
     assert one.differential_scale == pytest.approx(spans[1] / spans[0], abs=4.0 * (1.5e-6 + noise) / 0.093)
     assert one.table_displacement * DISPLACEMENT_SHOWS == pytest.approx(1.0 + common, abs=3e-5)
     assert one.table_acceleration == pytest.approx(one.table_displacement * DISPLACEMENT_SHOWS / 1.001, rel=1e-9)
-    # what is stated of the scale that the mean of the lasers keeps: see the module on where it comes from
+    # what is stated of the scale of the standard: see `test_standards` on where it comes from
     assert 0.001 < one.table_uncertainty < 0.002
     assert abs(common) < 2.0 * one.table_uncertainty
 
