@@ -104,18 +104,29 @@ def plant_of(specimen: Specimen, shaker: Shaker, catch_angle: float) -> "Plant":
     )
 
 
-def sights(states: Array, arrangement: Arrangement, on_ground: bool) -> Array:
-    """Displacement [m] and velocity [m/s] of the target of laser 1, then of laser 2, shape (4, n).
+def targets(samples: Array, arrangement: Arrangement) -> Array:
+    """The `samples` with the motion of laser 2's target relative to the table in place of that of storey 2; the same
+    object if the target is the storey.
 
-    The rows of `states`, shape (8 or more, n), are x, v, u1, u2, v1, v2, theta, omega. Lasers mounted on the ground
-    also measure the table's motion. Displacements are relative to mid range, which is the reading of each laser at
-    rest; NaN where there is no block or the beam misses it.
+    The columns, shape (n, 8 or more), are x, v, u1, u2, v1, v2, theta, omega. Displacements are relative to mid range,
+    which is the reading of each laser at rest; NaN where there is no block or the beam misses it.
     """
-    x, v, u1, u2, v1, v2, theta, omega = states[:8]
     height, specimen = arrangement.watched, arrangement.specimen
-    if height is not None and specimen.beta is None:
-        u2, v2 = np.full_like(u2, np.nan), np.full_like(v2, np.nan)
-    elif height is not None:
-        u2 = displacement(theta, height, specimen.block)
-        v2 = displacement_rate(theta, height, specimen.block) * omega
+    if height is None:
+        return samples
+    seen = samples.copy()
+    if specimen.beta is None:
+        seen[:, [3, 5]] = np.nan
+    else:
+        theta, omega = np.ascontiguousarray(samples[:, 6:8].T)
+        seen[:, 3] = displacement(theta, height, specimen.block)
+        seen[:, 5] = displacement_rate(theta, height, specimen.block) * omega
+    return seen
+
+
+def sights(samples: Array, arrangement: Arrangement, on_ground: bool) -> Array:
+    """Displacement [m] and velocity [m/s] of the target of laser 1, then of laser 2, shape (4, n), for the `samples` of
+    `targets`. Lasers mounted on the ground also measure the table's motion.
+    """
+    x, v, u1, u2, v1, v2 = targets(samples, arrangement).T[:6]
     return np.array([u1 + x, v1 + v, u2 + x, v2 + v] if on_ground else [u1, v1, u2, v2])

@@ -2,11 +2,15 @@
 
 from functools import lru_cache
 from math import pi, sin, tan
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sim.parameters import Parameters, quantity
+
+if TYPE_CHECKING:
+    from sim.kernel.filter import FilterState
 
 Array = NDArray[np.float64]
 
@@ -79,17 +83,25 @@ class FilterStream:
     """Running filter cards, already settled at the first sample."""
 
     def __init__(self, sections: Array, settled: Array) -> None:
-        from sim.kernel.filter import cascade
+        from sim.kernel.filter import FilterState, cascade
 
         self._cascade = cascade
-        self._sections = np.ascontiguousarray(sections)
-        self._settled = settled
-        self._state: Array | None = None
+        self._new = FilterState(
+            np.ascontiguousarray(sections),
+            np.ascontiguousarray(settled),
+            np.empty((len(sections), 0, 2)),
+            np.zeros(1, dtype=np.int64),
+        )
+        self._state = self._new
+
+    def state(self, channels: int) -> "FilterState":
+        """State of the cards of so many channels, which must be the same in all calls."""
+        if self._state is self._new:
+            self._state = self._new._replace(states=np.zeros((len(self._new.sections), channels, 2)))
+        return self._state
 
     def read(self, volts: Array) -> Array:
         """Filter voltages, shape (n_channels, n). Returns an array of the same shape."""
         filtered = np.array(volts, dtype=np.float64, order="C")
-        if self._state is None:
-            self._state = self._settled[:, None, :] * filtered[None, :, :1]
-        self._cascade(self._sections, self._state, filtered)
+        self._cascade(self.state(len(filtered)), filtered)
         return filtered

@@ -26,10 +26,10 @@ MODEL = {**STEADY, "resting": 14, "rocking": 20}
 RECORDS = {**MODEL, "members_at_rest": 10}
 """Modules used by predictions of many runs under a record."""
 
-BENCH = {**MODEL, "laser": 3, "filter": 2, "plant": 8, "table": 15}
+BENCH = {**MODEL, "laser": 3, "filter": 2, "instruments": 3, "plant": 8, "table": 15}
 """Modules used by a simulated bench."""
 
-APART = ("resting", "laser", "filter", "plant", "table", "rocking")
+APART = ("resting", "laser", "filter", "instruments", "plant", "table", "rocking")
 """Modules compiled by the helper, in this order."""
 
 _HELPER = """

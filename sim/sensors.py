@@ -17,6 +17,36 @@ from sim.parameters import Parameters, quantity
 Array = NDArray[np.float64]
 
 
+PORTION = 4096
+"""Number of normal numbers drawn at once from each generator."""
+
+
+class NormalNumbers:
+    """Standard normal numbers from several generators, drawn in large portions, since each call takes as long as
+    a hundred numbers. They are the same as with one call per use.
+    """
+
+    def __init__(self, *generators: Generator) -> None:
+        self._generators = generators
+        self._drawn = np.empty((len(generators), 0))
+        self._used = 0
+
+    def take(self, n: int) -> Array:
+        """The next `n` numbers of each generator, shape (generators, n)."""
+        if self._used + n > self._drawn.shape[1]:
+            rest = self._drawn[:, self._used :]
+            more = max(PORTION, n) - rest.shape[1]
+            drawn = np.empty((len(self._generators), rest.shape[1] + more))
+            drawn[:, : rest.shape[1]] = rest
+            for row, each in zip(drawn, self._generators, strict=True):
+                row[rest.shape[1] :] = each.standard_normal(more)
+            self._drawn = drawn
+            self._used = 0
+        taken = self._drawn[:, self._used : self._used + n]
+        self._used += n
+        return taken
+
+
 class Laser(Parameters):
     """Triangulation laser similar to the optoNCDT 1420, read at its analogue output. The reading at rest is mid range.
 
@@ -66,14 +96,13 @@ class LaserStream:
     """Running laser, which converts the target's motion at the ticks to the output at the ticks."""
 
     def __init__(self, laser: Laser, sample_rate: float, seed: SeedSequence) -> None:
-        from sim.kernel.laser import measure
+        from sim.kernel.laser import LaserState, measure
 
         self._measure = measure
-        self._noise = laser.noise
-        self._random = np.random.default_rng(seed)
-        self._phase = float(self._random.uniform())
-        wave_phase = float(self._random.uniform(0.0, 2.0 * np.pi))
-        self._constants = np.array(
+        random = np.random.default_rng(seed)
+        phase = float(random.uniform())
+        wave_phase = float(random.uniform(0.0, 2.0 * np.pi))
+        constants = np.array(
             [
                 laser.measuring_range,
                 1.0 + laser.scale_error,
@@ -83,38 +112,30 @@ class LaserStream:
                 2.0**laser.output_bits,
                 laser.load,
                 laser.error_current,
+                laser.noise,
             ]
         )
-        self._per_tick = laser.rate * (1.0 + laser.clock_error) / sample_rate
-        self._tick_length = 1.0 / sample_rate
-        self._tick = 0
-        self._following = floor(-self._phase) - laser.latency
-        self._last = np.zeros(2)
-        self._taken = np.empty(laser.latency + 1)
+        self._per_tick, self._phase = laser.rate * (1.0 + laser.clock_error) / sample_rate, phase
+        clock = np.array([self._per_tick, phase, 1.0 / sample_rate])
+        self.state = LaserState(
+            constants,
+            clock,
+            np.array([0, floor(-phase) - laser.latency]),
+            np.zeros(2),
+            np.empty(laser.latency + 1),
+        )
+        self._normals = NormalNumbers(random)
+
+    def noise(self, ticks: int) -> Array:
+        """Standard normal numbers for the measurements that are new at the end of the next `ticks`, shape (m,)."""
+        tick, following = self.state.counters.tolist()
+        newest = floor((tick + ticks - 1) * self._per_tick - self._phase)
+        return self._normals.take(newest + 1 - following)[0]
 
     def read(self, displacement: Array, velocity: Array) -> Array:
         """Output [V] at each tick, shape (n,), for the position [m] and velocity [m/s] of the target, shape (n,)."""
-        if self._tick == 0:
-            # before the first tick, the output is a measurement of the storey at rest
-            self._last[0] = displacement[0]
-        newest = floor((self._tick + displacement.size - 1) * self._per_tick - self._phase)
-        noise = self._noise * self._random.standard_normal(newest + 1 - self._following)
         volts = np.empty(displacement.size)
-        self._following = self._measure(
-            self._tick,
-            self._following,
-            self._per_tick,
-            self._phase,
-            self._tick_length,
-            self._constants,
-            noise,
-            displacement,
-            velocity,
-            self._last,
-            self._taken,
-            volts,
-        )
-        self._tick += displacement.size
+        self._measure(self.state, self.noise(displacement.size), displacement, velocity, volts)
         return volts
 
 
@@ -130,13 +151,16 @@ class LinearSensor(Parameters):
         """Scale [unit/V] and offset [unit] from the calibration: value = scale * volts + offset."""
         return 1.0 / self.sensitivity, 0.0
 
+    def constants(self, sample_rate: float) -> tuple[float, float, float]:
+        """Standard deviation of the noise [unit], white up to half the `sample_rate` [1/s], sensitivity [V/unit] and
+        voltage at zero [V].
+        """
+        return self.noise_density * (0.5 * sample_rate) ** 0.5, self.sensitivity * (1.0 + self.scale_error), 0.0
+
     def volts(self, value: Array, sample_rate: float, random: Generator) -> Array:
-        """Output [V] for values in the sensor's unit, same shape; the noise is white up to half the sample rate."""
-        found = random.standard_normal(value.size)
-        found *= self.noise_density * (0.5 * sample_rate) ** 0.5
-        found += value
-        found *= self.sensitivity * (1.0 + self.scale_error)
-        return found
+        """Output [V] for values in the sensor's unit, same shape."""
+        level, slope, zero = self.constants(sample_rate)
+        return (random.standard_normal(value.size) * level + value) * slope + zero
 
 
 class Accelerometer(LinearSensor):
@@ -173,8 +197,9 @@ class PlacedSensor(LinearSensor):
     def nominal(self) -> tuple[float, float]:
         return 1.0 / self.sensitivity, -self.zero / self.sensitivity
 
-    def volts(self, value: Array, sample_rate: float, random: Generator) -> Array:
-        return super().volts(value, sample_rate, random) + self.zero
+    def constants(self, sample_rate: float) -> tuple[float, float, float]:
+        level, slope, _ = super().constants(sample_rate)
+        return level, slope, self.zero
 
 
 class Converter(Parameters):

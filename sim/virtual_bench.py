@@ -9,12 +9,12 @@ from numpy.random import SeedSequence
 from numpy.typing import NDArray
 from pydantic import model_validator
 
-from sim.arrangement import Arrangement, sights
+from sim.arrangement import Arrangement, sights, targets
 from sim.channel import STOREYS, TABLE_ACCELERATION, TABLE_DISPLACEMENT, Channel
 from sim.errors import InvalidInput
 from sim.filter_unit import FilterUnit
 from sim.parameters import Parameters, quantity
-from sim.sensors import Accelerometer, Converter, DisplacementSensor, Laser, PlacedSensor
+from sim.sensors import Accelerometer, Converter, DisplacementSensor, Laser, NormalNumbers, PlacedSensor
 from sim.shaker import Shaker
 from sim.specimen import Specimen
 
@@ -96,24 +96,29 @@ class VirtualBench:
         self, parameters: VirtualBenchParameters, specimen: Specimen, seed: int, further: Sequence[PlacedSensor] = ()
     ) -> None:
         from sim.kernel import table
+        from sim.kernel.instruments import digitise_motion
 
-        self._kernel = table
+        self._kernel, self._digitise_motion = table, digitise_motion
         self.parameters = parameters
         self._further = tuple(further)
         # the first generators do not depend on the number of sensors
         sources = SeedSequence(seed).spawn(7 + len(self._further))
         rate = parameters.tick_rate
-        self._force_random, self._displacement_random, self._accelerometer_random = (
-            np.random.default_rng(source) for source in sources[:3]
-        )
+        force, displacement, accelerometer = (np.random.default_rng(source) for source in sources[:3])
+        self._force_noise = NormalNumbers(force)
+        self._force_level = parameters.shaker.force_noise * (0.5 * rate) ** 0.5
+        self._hand_random = np.random.default_rng(sources[6])
+        randoms = [np.random.default_rng(source) for source in sources[7:]]
+        self._linear_noise = NormalNumbers(displacement, accelerometer, *randoms)
+        linear = parameters.displacement_sensor, parameters.accelerometer, *self._further
+        self._linear = np.array([sensor.constants(rate) for sensor in linear])
         self._laser_1 = parameters.laser_1.stream(rate, sources[3])
         self._laser_2 = parameters.laser_2.stream(rate, sources[4])
-        self._converter_random = np.random.default_rng(sources[5])
-        self._hand_random = np.random.default_rng(sources[6])
-        self._further_randoms = [np.random.default_rng(source) for source in sources[7:]]
+        self._input_noise = NormalNumbers(np.random.default_rng(sources[5]))
         self._velocities = np.zeros(3)
+        self._no_values = np.empty((0, 0))
         self._held_for: int | None = None
-        self._filter = parameters.filter_unit.stream(rate)
+        self._cards = parameters.filter_unit.stream(rate).state(len(self._linear) + 2)
         step = min(_LONGEST_STEP, parameters.shaker.shortest_time / _STEPS_PER_TIME_CONSTANT)
         self._substeps = ceil(1.0 / (rate * step) - 1e-9)
         self._state = np.zeros(table.STATES)
@@ -171,19 +176,37 @@ class VirtualBench:
     @property
     def sights(self) -> Array:
         """True motion of the lasers' targets in the last `run` or `coast`, shape (4, n); see `sim.arrangement`."""
-        return self._laser_displacements(np.ascontiguousarray(self._samples.T))
+        return sights(self._samples, self._arrangement, self._grounded)
 
-    def _laser_displacements(self, states: Array) -> Array:
+    @property
+    def _grounded(self) -> bool:
         # both lasers have the same reference, as the parameters require
-        return sights(states, self._arrangement, self.parameters.laser_1.reference == "ground")
+        return self.parameters.laser_1.reference == "ground"
 
     def run(self, volts: Array) -> NDArray[np.int16]:
         """Play `volts` [V], shape (n,), and return the counts sampled at the same ticks, shape (n, n_channels)."""
-        if volts.size == 0:
-            return np.empty((0, 4 + len(self._further)), dtype=np.int16)
-        self._move(volts)
-        filtered = self._filter.read(self._sense())
-        return self.parameters.converter.counts(filtered.T, self._converter_random)
+        n, channels, converter = volts.size, len(self._linear) + 2, self.parameters.converter
+        counts = np.empty((channels, n), dtype=np.int16)
+        if n > 0:
+            self._move(volts)
+            self._digitise_motion(
+                targets(self._samples, self._arrangement),
+                self._grounded,
+                self._further_values(),
+                self._linear_noise.take(n),
+                self._linear,
+                self._laser_1.state,
+                self._laser_1.noise(n),
+                self._laser_2.state,
+                self._laser_2.noise(n),
+                self._cards,
+                self._input_noise.take(n * channels).reshape(n, channels),
+                converter.noise,
+                converter.lsb,
+                *converter.codes,
+                counts,
+            )
+        return counts.T
 
     def coast(self, seconds: float) -> None:
         """Simulate the bench at zero drive without sampling."""
@@ -233,11 +256,10 @@ class VirtualBench:
         self._held_for = None
 
     def _move(self, volts: Array) -> None:
-        p, n = self.parameters, volts.size
-        reach = p.shaker.drive_range
-        requests = p.shaker.gain * np.clip(np.ascontiguousarray(volts, dtype=np.float64), -reach, reach)
-        noise_level = p.shaker.force_noise * (0.5 * p.tick_rate) ** 0.5
-        noise = noise_level * self._force_random.standard_normal(n)
+        shaker, n = self.parameters.shaker, volts.size
+        # numpy's clip takes several times as long for short blocks
+        requests = shaker.gain * np.minimum(np.maximum(volts, -shaker.drive_range), shaker.drive_range)
+        noise = self._force_level * self._force_noise.take(n)[0]
         self._samples = np.empty((n, self._kernel.COLUMNS))
         start = 0
         if self._held_for is not None and self._held_for < n:
@@ -262,21 +284,12 @@ class VirtualBench:
             self._samples[ticks],
         )
 
-    def _sense(self) -> Array:
-        """Voltages at the inputs of the filter cards, shape (n_channels, n)."""
-        p, s = self.parameters, np.ascontiguousarray(self._samples.T)
-        volts = np.empty((4 + len(self._further), s.shape[1]))
-        volts[0] = p.displacement_sensor.volts(s[0], p.tick_rate, self._displacement_random)
-        volts[1] = p.accelerometer.volts(s[8], p.tick_rate, self._accelerometer_random)
-        seen = self._laser_displacements(s)
-        volts[2] = self._laser_1.read(seen[0], seen[1])
-        volts[3] = self._laser_2.read(seen[2], seen[3])
-        if self._further:
-            motion = self._motion(s)
-            for k, (sensor, random) in enumerate(zip(self._further, self._further_randoms, strict=True), 4):
-                value = motion[sensor.measures][_PLACES.index(sensor.place)]
-                volts[k] = sensor.volts(value, p.tick_rate, random)
-        return volts
+    def _further_values(self) -> Array:
+        """Values at the further sensors [unit], shape (m, n)."""
+        if not self._further:
+            return self._no_values
+        motion = self._motion(self._samples.T)
+        return np.array([motion[sensor.measures][_PLACES.index(sensor.place)] for sensor in self._further])
 
     def _motion(self, s: Array) -> dict[str, Array]:
         """Displacement, velocity and acceleration of table and storeys relative to the ground, each of shape (3, n).

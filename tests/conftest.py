@@ -75,7 +75,7 @@ SLOW = (
 
 KERNELS = (
     "sim.kernel.members_at_rest",
-    "sim.kernel.table, sim.kernel.laser, sim.kernel.filter, sim.kernel.rocking, sim.kernel.equations",
+    "sim.kernel.table, sim.kernel.instruments, sim.kernel.rocking, sim.kernel.equations",
 )
 """Modules that compile all of the kernel when they are imported, divided between two processors."""
 

@@ -3,22 +3,56 @@
 Measurement k is taken at tick (k + phase) / per_tick, a real number, and is output `latency` measurements later.
 """
 
+# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
+# pyright: reportUnknownArgumentType=false
+# numba has no type annotations.
+
 import math
+from typing import Any, NamedTuple
 
 import numpy as np
+from numba import types
 from numpy.typing import NDArray
 
 from sim.kernel.compiled import compiled
 
-RANGE, GAIN, LINEARITY, WAVES, WAVE_PHASE, STEPS, LOAD, ERROR_CURRENT = range(8)
+Array = NDArray[np.float64]
+
+RANGE, GAIN, LINEARITY, WAVES, WAVE_PHASE, STEPS, LOAD, ERROR_CURRENT, NOISE = range(9)
 """Indices of the constants: measuring range [m], sensitivity relative to nominal [1], linearity error [1], number of
 periods of this error in the range [1] and their phase [rad], number of steps of the output [1], load [ohm], error
-current [A].
+current [A], standard deviation of a measurement [m].
 """
+
+PER_TICK, PHASE, TICK_LENGTH = range(3)
+"""Indices of the clock: measurements per tick [1], offset of the first one [1], duration of a tick [s]."""
+
+TICK, FOLLOWING = range(2)
+"""Indices of the counters: number of the next tick, and of the next measurement."""
+
+
+class LaserState(NamedTuple):
+    """A running laser. `counters`, `last` and `taken` change.
+
+    last : shape (2,), position [m] and velocity [m/s] of the target at the previous tick.
+    taken : shape (latency + 1,), the latest measurements [m], indexed by their number modulo this length.
+    """
+
+    constants: Array
+    clock: Array
+    counters: NDArray[np.int64]
+    last: Array
+    taken: Array
+
+
+# the type of LASER cannot be written as a string, so the signatures are numba objects, which are untyped
+_VOID: Any = types.void
+ROW: Any = types.float64[::1]
+LASER: Any = types.NamedTuple((ROW, ROW, types.int64[::1], ROW, ROW), LaserState)
 
 
 @compiled("float64(float64, float64[::1])")
-def output(displacement: float, constants: NDArray[np.float64]) -> float:
+def output(displacement: float, constants: Array) -> float:
     """Voltage [V] across the load at a displacement [m] from mid range: 4 to 20 mA with a reserve of 1 % at both ends,
     and the error current beyond this range.
     """
@@ -30,34 +64,19 @@ def output(displacement: float, constants: NDArray[np.float64]) -> float:
     return constants[LOAD] * constants[ERROR_CURRENT]
 
 
-@compiled(
-    "int64(int64, int64, float64, float64, float64, float64[::1], float64[::1], float64[::1], float64[::1],"
-    " float64[::1], float64[::1], float64[::1])"
-)
-def measure(
-    tick: int,
-    following: int,
-    per_tick: float,
-    phase: float,
-    tick_length: float,
-    constants: NDArray[np.float64],
-    noise: NDArray[np.float64],
-    x: NDArray[np.float64],
-    v: NDArray[np.float64],
-    last: NDArray[np.float64],
-    taken: NDArray[np.float64],
-    volts: NDArray[np.float64],
-) -> int:
-    """Write the output at each tick to `volts`, shape (n,). Returns the number of the next measurement.
+@compiled(_VOID(LASER, ROW, ROW, ROW, ROW))
+def measure(laser: LaserState, normal: Array, x: Array, v: Array, volts: Array) -> None:
+    """Write the output at each tick to `volts`, shape (n,).
 
-    tick, following : numbers of the first tick and of the next measurement.
-    per_tick, phase, tick_length : measurements per tick [1], offset of the first one [1], duration of a tick [s].
-    noise : shape (m,), error [m] of each of the m new measurements up to the last tick.
+    normal : shape (m,), a standard normal number for each of the m new measurements up to the last tick.
     x, v : shape (n,), position [m] and velocity [m/s] of the target at the ticks, interpolated by cubic Hermite curves.
-    last : shape (2,), x and v at the previous tick, updated.
-    taken : shape (latency + 1,), the latest measurements [m], indexed by their number modulo this length, updated.
     """
-    depth, used = taken.size, 0
+    last, taken, tick, following = laser.last, laser.taken, laser.counters[TICK], laser.counters[FOLLOWING]
+    per_tick, phase, tick_length = laser.clock[PER_TICK], laser.clock[PHASE], laser.clock[TICK_LENGTH]
+    depth, used, noise = taken.size, 0, laser.constants[NOISE]
+    if tick == 0:
+        # before the first tick, the output is a measurement of the storey at rest
+        last[0] = x[0]
     for i in range(x.size):
         newest = math.floor((tick + i) * per_tick - phase)
         while following <= newest:
@@ -66,9 +85,9 @@ def measure(
             rest = 1.0 - place
             start = last[0] * (1.0 + 2.0 * place) + tick_length * last[1] * place
             end = x[i] * (1.0 + 2.0 * rest) - tick_length * v[i] * rest
-            taken[following % depth] = start * rest * rest + end * place * place + noise[used]
+            taken[following % depth] = start * rest * rest + end * place * place + noise * normal[used]
             following += 1
             used += 1
         last[0], last[1] = x[i], v[i]
-        volts[i] = output(taken[(newest - depth + 1) % depth], constants)
-    return following
+        volts[i] = output(float(taken[(newest - depth + 1) % depth]), laser.constants)
+    laser.counters[TICK], laser.counters[FOLLOWING] = tick + x.size, following

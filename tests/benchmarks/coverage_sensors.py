@@ -19,6 +19,7 @@ from protocols.laser_calibration.protocol import LaserCalibrationParameters
 from protocols.laser_calibration.scales import calibration
 from sim.excitation import SampledRecord
 from sim.filter_unit import FilterUnit
+from sim.kernel.laser import WAVE_PHASE
 from sim.rocking import State, Status, simulate
 from sim.sensors import Laser
 from sim.specimen import Specimen
@@ -190,7 +191,7 @@ class Sensors:
     def reading(self, number: int, displacement: Array) -> Array:
         """Readings of laser 0 or 1 at `displacement` [m] from rest, relative to mid range, without noise and steps."""
         laser, x = self.lasers[number], displacement + self.rest[number]
-        phase = float(laser.stream(RATE, self.seeds[number])._constants[4])
+        phase = float(laser.stream(RATE, self.seeds[number]).state.constants[WAVE_PHASE])
         turns = tau * laser.linearity_periods * x / laser.measuring_range
         return x * (1.0 + laser.scale_error) + laser.measuring_range * laser.linearity * np.sin(turns + phase)
 
