@@ -39,7 +39,7 @@ class NormalNumbers:
             drawn = np.empty((len(self._generators), rest.shape[1] + more))
             drawn[:, : rest.shape[1]] = rest
             for row, each in zip(drawn, self._generators, strict=True):
-                row[rest.shape[1] :] = each.standard_normal(more)
+                each.standard_normal(out=row[rest.shape[1] :])
             self._drawn = drawn
             self._used = 0
         taken = self._drawn[:, self._used : self._used + n]

@@ -1,22 +1,23 @@
 """Gain coefficient alpha_2 during a test, evaluated whenever the motion is checked for steadiness."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from bench.analysis.gain import DRAWS, SEED, Gain, SteadyPeak, gain
 from bench.analysis.sensor_accuracy import PeakReadings, SensorUncertainty, Shapes, SharedDraws
 
 CHANGED = 0.003
-"""Change of a reading, relative to the swing of its laser, below which a running gain keeps the shapes of the linearity
-errors.
-"""
+"""Change of a reading, relative to the swing of its laser, below which a running gain keeps the lasers' errors."""
 
 
 class RunningGain:
     """alpha_2 during a test, with the budget of `gain` except the contribution of the table's amplitude, whose slope is
     not yet known.
 
-    The linearity errors of the lasers, which take most of the computing time, are evaluated again when a reading has
-    changed by more than `CHANGED`. Until then, those of the earlier motion are used, scaled with the drift.
+    The errors due to linearity and resolution of the lasers, which take most of the computing time, are evaluated again
+    when a reading has changed by more than `CHANGED`. Until then, those of the earlier motion are used; linearity
+    errors are scaled with the drift.
     """
 
     def __init__(self, bare: SteadyPeak, sensors: SensorUncertainty, shared: SharedDraws) -> None:
@@ -30,6 +31,7 @@ class RunningGain:
         if self._kept is not None and not _changed(self._kept[0], coupled.readings):
             at, kept = self._kept
             shapes = kept.scaled((1.0, coupled.readings.drift / at.drift))
+            coupled = replace(coupled, readings=replace(coupled.readings, fitted=at.fitted))
         found = gain(coupled, self._bare, self._sensors, shared=self._shared.again(), shapes=shapes)
         if shapes is None:
             self._kept = coupled.readings, found.shapes

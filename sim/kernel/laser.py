@@ -74,6 +74,7 @@ def measure(laser: LaserState, normal: Array, x: Array, v: Array, volts: Array) 
     last, taken, tick, following = laser.last, laser.taken, laser.counters[TICK], laser.counters[FOLLOWING]
     per_tick, phase, tick_length = laser.clock[PER_TICK], laser.clock[PHASE], laser.clock[TICK_LENGTH]
     depth, used, noise = taken.size, 0, laser.constants[NOISE]
+    slot = following % depth
     if tick == 0:
         # before the first tick, the output is a measurement of the storey at rest
         last[0] = x[0]
@@ -85,9 +86,11 @@ def measure(laser: LaserState, normal: Array, x: Array, v: Array, volts: Array) 
             rest = 1.0 - place
             start = last[0] * (1.0 + 2.0 * place) + tick_length * last[1] * place
             end = x[i] * (1.0 + 2.0 * rest) - tick_length * v[i] * rest
-            taken[following % depth] = start * rest * rest + end * place * place + noise * normal[used]
+            taken[slot] = start * rest * rest + end * place * place + noise * normal[used]
             following += 1
             used += 1
+            slot = slot + 1 if slot + 1 < depth else 0
         last[0], last[1] = x[i], v[i]
-        volts[i] = output(float(taken[(newest - depth + 1) % depth]), laser.constants)
+        # the oldest of the latest measurements is the one that the next measurement replaces
+        volts[i] = output(float(taken[slot]), laser.constants)
     laser.counters[TICK], laser.counters[FOLLOWING] = tick + x.size, following

@@ -28,6 +28,9 @@ Array = NDArray[np.float64]
 REST, ROCK_A, ROCK_B, FALLEN = 0, 1, 2, 3
 """Contact modes: at rest, rocking about A (theta > 0), rocking about B (theta < 0), held by the catch."""
 
+SATURATED = 40.0
+"""Argument from which the exponential of the friction, exp(40), is too large to change the result."""
+
 STATES = 8
 """Number of values in the state."""
 
@@ -88,8 +91,12 @@ def table_force(x: float, v: float, request: float, p: Plant) -> float:
     current = max(current, (-p.voltage_limit - back_emf) / p.resistance)
     current = min(current, (p.voltage_limit - back_emf) / p.resistance)
     current = min(max(current, -p.current_limit), p.current_limit)
-    # tanh from one exponential: twice as fast as the library function, and accurate to rounding
-    friction = p.friction * (1.0 - 2.0 / (math.exp(2.0 * v / p.friction_velocity) + 1.0))
+    relative = 2.0 * v / p.friction_velocity
+    if abs(relative) < SATURATED:
+        # tanh from one exponential: twice as fast as the library function, and accurate to rounding
+        friction = p.friction * (1.0 - 2.0 / (math.exp(relative) + 1.0))
+    else:
+        friction = math.copysign(p.friction, v)
     force = p.bl * current - p.k_s * x - p.c_s * v - friction
     over = abs(x) - p.half_stroke
     if over > 0.0:
