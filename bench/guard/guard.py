@@ -16,6 +16,7 @@ from bench.analysis.signals import DRIFT, SIGNALS, SignalMap
 from bench.guard.conversion import Conversion
 from bench.guard.limits import Limits, Ramps, Violation, ramp_refusal
 from bench.guard.motion import ChannelLimit, MotionWatch
+from bench.guard.quantities import largest
 from bench.guard.sensors import SensorWatch, TimeWatch
 from bench.guard.shaker import ShakerModel
 from drivers.errors import SafetyInputOpen
@@ -207,11 +208,11 @@ class Guard:
 
     def _acceptable(self, volts: NDArray[np.float64]) -> bool:
         """Whether commands are within the limits; False if one is NaN, because comparisons with NaN are False."""
-        largest, first = self._limits.drive_voltage, abs(float(volts[0]) - self._command)
-        if not (volts.max() <= largest and volts.min() >= -largest and first <= self._slew):
+        first = abs(float(volts[0]) - self._command)
+        if not (largest(volts) <= self._limits.drive_voltage and first <= self._slew):
             return False
         change = volts[1:] - volts[:-1]
-        return not change.size or bool(change.max() <= self._slew and change.min() >= -self._slew)
+        return not change.size or largest(change) <= self._slew
 
     def tare(self, values: NDArray[np.float64], *, drift: bool = True) -> None:
         """Take the mean of values at rest, shape (n, n_channels), as the zero of every signal.
