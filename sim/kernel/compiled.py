@@ -35,8 +35,9 @@ def _absent(*names: str) -> Generator[None, None, None]:
             del sys.modules[name]
 
 
-# numba imports these wherever they are installed, but needs none of them here: a tenth of the time of a short command
-with _absent("cffi", "coverage", "scipy", "yaml"):
+# numba imports these wherever they are installed, but needs none of them here: a tenth of the time of a short command.
+# No other thread imports them meanwhile, because nothing else in this program uses them
+with _absent("cffi", "coverage", "yaml"):
     import llvmlite.binding
     import numba
     import numba.np.linalg
