@@ -9,13 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.analysis.cycles import Cycle, Waves, mean_amplitude, mean_waves
+from bench.analysis.draws import Draws
 from bench.analysis.error_curve import Checks, Harmonics
 from bench.analysis.linearity import LinearFrame
+from bench.analysis.peak_readings import PeakReadings, Shapes
 from bench.analysis.remaining_transient import remaining_transient
 from bench.analysis.rounding import FittedPeak
 from bench.analysis.rounding_correction import MODEL, rounding
-from bench.analysis.sensor_accuracy import Draws, PeakReadings, SensorUncertainty, Shapes
 from bench.analysis.sensor_accuracy import SensorAccuracy as SensorAccuracy
+from bench.analysis.sensor_accuracy import SensorUncertainty
 from bench.analysis.signals import ACCELERATION, DRIFT, LASER_1, LASER_2, U1
 from bench.analysis.uncertainty import COVERAGE as COVERAGE
 from bench.analysis.uncertainty import NOISE, Budget, combined_freedom

@@ -11,15 +11,15 @@ them.
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import hypot, sqrt
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.analysis.draws import Draws
 from bench.analysis.error_curve import Checks, Harmonics, widest
 from bench.analysis.laser_calibration import LaserCalibration
 from bench.analysis.linearity import SMOOTH, Effect, LinearityErrors, linearity_errors
-from bench.analysis.rounding import FittedPeak
+from bench.analysis.peak_readings import PeakReadings, Shapes, beyond, shares_of
 from sim.parameters import Parameters, quantity
 
 Array = NDArray[np.float64]
@@ -57,54 +57,6 @@ class SensorAccuracy(Parameters):
     timebase: float = quantity(
         3e-5, "1", "relative error of the sample clock: limits of 50 ppm, divided by sqrt(3)", ge=0, le=0.01
     )
-
-
-@dataclass(frozen=True, eq=False)
-class PeakReadings:
-    """Readings of both lasers at the peak of a drift, relative to the rest position of the storeys.
-
-    drift, sign : the peak [m], and its sign, 1 or -1.
-    lasers, speeds : reading of each laser [m] and its rate [m/s].
-    zero : readings [m], shape (2, n), whose mean is the zero of the peak; zeros, shape (2, 1), if it was taken at rest.
-    swings : span of each laser's readings [m] in the fit of the peak.
-    at_rest : whether the zero was taken at rest, where rounding errors do not average out.
-    weights : derivatives of the peak of a fitted cycle with respect to the readings in `zero`, shape (n,); None if the
-        peak is the reading at the peak minus the mean of `zero`.
-    fitted : the fitted cycles of which it is the peak; None for a fit to the readings around a single peak.
-    """
-
-    drift: float
-    sign: float
-    lasers: tuple[float, float]
-    speeds: tuple[float, float]
-    zero: Array
-    swings: tuple[float, float]
-    at_rest: bool
-    weights: Array | None = None
-    fitted: FittedPeak | None = None
-
-    def effect(self, laser: int) -> Effect:
-        """Effect of the error of laser 0 or 1 on the peak."""
-        zero = self.zero[laser]
-        if self.weights is not None:
-            return Effect(zero, self.weights)
-        means = np.full(zero.size, -1.0 / zero.size)
-        return Effect(np.append(zero, self.lasers[laser]), np.append(means, 1.0))
-
-
-@dataclass(frozen=True, eq=False)
-class Shapes:
-    """Errors of the same peaks due to the linearity of each laser and, for calibrated lasers, due to the linearity of
-    the calibration's reference sensor, which affects both lasers equally.
-    """
-
-    lasers: tuple[LinearityErrors | None, LinearityErrors | None]
-    common: LinearityErrors | None = None
-
-    def scaled(self, factors: Sequence[float]) -> "Shapes":
-        """The errors multiplied by one factor per peak."""
-        first, second, common = (None if each is None else each.scaled(factors) for each in (*self.lasers, self.common))
-        return Shapes((first, second), common)
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,7 +113,7 @@ class SensorUncertainty:
         return [each.rounded(step) for each in widest([both[laser] for both in self.checks])]
 
     def drift_errors(
-        self, seen: Sequence[PeakReadings], draws: "Draws", shapes: "Shapes | None" = None
+        self, seen: Sequence[PeakReadings], draws: Draws, shapes: Shapes | None = None
     ) -> dict[str, Array]:
         """Errors [m] of the peaks in tests with the same lasers, by contribution, shape (tests, n) each.
 
@@ -182,11 +134,11 @@ class SensorUncertainty:
         sides = np.array([[each.sign] for each in seen])
         return {name: sides * each for name, each in errors.items()}
 
-    def linearity(self, laser: int, seen: Sequence[PeakReadings], draws: "Draws") -> Array:
+    def linearity(self, laser: int, seen: Sequence[PeakReadings], draws: Draws) -> Array:
         """Errors [m] of the peaks due to the linearity of laser 0 or 1, in each test, shape (tests, n)."""
         return self._linearity(laser, self._shape(laser, seen), seen, draws)
 
-    def u1_linearity(self, seen: Sequence[PeakReadings], table: Sequence[float], draws: "Draws") -> Array:
+    def u1_linearity(self, seen: Sequence[PeakReadings], table: Sequence[float], draws: Draws) -> Array:
         """Errors [m] of the peaks of u1 due to the linearity of laser 0 and, if it is calibrated, of the calibration's
         reference sensor, shape (tests, n). The reference sensor also measures the displacements `table` [m] at the
         peaks, which are zero if the lasers are on the table.
@@ -194,11 +146,11 @@ class SensorUncertainty:
         errors = self.linearity(0, seen, draws)
         weights = np.array([1.0, -1.0])
         effects = [Effect(np.array([each.lasers[0], x]), weights) for each, x in zip(seen, table, strict=True)]
-        common = self._common(effects, _shares(seen))
+        common = self._common(effects, shares_of(seen))
         return errors if common is None else errors + common.draws(draws.normal(len(seen)))
 
     def _linearity(
-        self, laser: int, shape: LinearityErrors | None, seen: Sequence[PeakReadings], draws: "Draws"
+        self, laser: int, shape: LinearityErrors | None, seen: Sequence[PeakReadings], draws: Draws
     ) -> Array:
         normal = draws.normal(len(seen))
         if self.calibration is None:
@@ -209,7 +161,7 @@ class SensorUncertainty:
         errors = np.sqrt(readings) * self.calibration.lasers[laser].uncertainty * draws.normal(len(seen))
         return errors if shape is None else errors + shape.draws(normal)
 
-    def shapes(self, seen: Sequence[PeakReadings]) -> "Shapes":
+    def shapes(self, seen: Sequence[PeakReadings]) -> Shapes:
         """Errors of the peaks due to the unknown shapes of the linearity errors."""
         lasers = self._shape(0, seen), self._shape(1, seen)
         if self.calibration is None:
@@ -219,7 +171,7 @@ class SensorUncertainty:
             first, second = each.effect(0), each.effect(1)
             places = np.append(first.places, second.places)
             effects.append(Effect(places, np.append(-first.weights, second.weights)))
-        return Shapes(lasers, self._common(effects, _shares(seen)))
+        return Shapes(lasers, self._common(effects, shares_of(seen)))
 
     def _shape(self, laser: int, seen: Sequence[PeakReadings]) -> LinearityErrors | None:
         """Linearity errors of laser 0 or 1; for a calibrated laser, only those outside the calibrated range, None if no
@@ -229,15 +181,15 @@ class SensorUncertainty:
         limit = self.accuracy.laser_linearity * whole
         effects = [each.effect(laser) for each in seen]
         if self.calibration is None:
-            return linearity_errors(effects, _shares(seen), limit, whole, self.checks_of(laser), self.corrected)
+            return linearity_errors(effects, shares_of(seen), limit, whole, self.checks_of(laser), self.corrected)
         found = self.calibration.lasers[laser]
         low, high = found.lowest - found.rest, found.highest - found.rest
-        beyond = [_beyond(each, low, high) for each in effects]
-        if not any(each.weights.size for each in beyond):
+        outside = [beyond(each, low, high) for each in effects]
+        if not any(each.weights.size for each in outside):
             return None
-        return linearity_errors(beyond, _shares(seen), limit, whole)
+        return linearity_errors(outside, shares_of(seen), limit, whole)
 
-    def rough(self, shapes: "Shapes") -> tuple[str, ...]:
+    def rough(self, shapes: Shapes) -> tuple[str, ...]:
         """Remark on each laser whose linearity error, according to the tests of the bare frame, is not smooth."""
         if self.calibration is not None or not self.checks or self.accuracy.laser_linearity == 0.0:
             return ()
@@ -264,13 +216,13 @@ class SensorUncertainty:
         limit = self.calibration.common_linearity
         return linearity_errors(effects, shares, limit, min(self.ranges), checks)
 
-    def late(self, seen: PeakReadings, laser: int, draws: "Draws") -> Array:
+    def late(self, seen: PeakReadings, laser: int, draws: Draws) -> Array:
         """Errors [m] due to the delay of a laser with a free-running clock, uniform within one measuring period, shape
         (n,).
         """
         return seen.speeds[laser] * self.accuracy.laser_timing * draws.uniform(-0.5, 0.5)
 
-    def steps(self, seen: PeakReadings, laser: int, draws: "Draws") -> Array:
+    def steps(self, seen: PeakReadings, laser: int, draws: Draws) -> Array:
         """Errors [m] due to a laser's resolution, shape (n,): the rounding errors of the fit, and one rounding error if
         the zero was taken at rest. A fit around a single peak averages those of the steps that the laser passes.
         """
@@ -283,68 +235,3 @@ class SensorUncertainty:
             variance = step**2 / (12.0 * (1.0 + 2.0 * seen.swings[laser] / step))
         zero = step * draws.uniform(-0.5, 0.5) if seen.at_rest else 0.0
         return sqrt(variance) * draws.normal() + zero
-
-
-def _shares(seen: Sequence[PeakReadings]) -> Array:
-    """Derivatives, with respect to the peaks, of the logarithm of the ratio of the second peak to the first, or of a
-    single peak. Further peaks, which may be the true largest ones of these tests, are not part of the ratio.
-    """
-    shares = np.array([each.sign / each.drift for each in seen])
-    if shares.size > 1:
-        shares[0] *= -1.0
-        shares[2:] = 0.0
-    return shares
-
-
-def _beyond(effect: Effect, low: float, high: float) -> Effect:
-    """Part of an effect that is due to errors at readings outside `low` to `high` [m], relative to the error at the
-    nearer end.
-    """
-    out = (effect.places < low) | (effect.places > high)
-    places, weights = effect.places[out], effect.weights[out]
-    return Effect(np.append(places, np.clip(places, low, high)), np.append(weights, -weights))
-
-
-class Draws:
-    """Draws of sensor errors from one generator, `n` per call, in the order of the calls."""
-
-    def __init__(self, random: np.random.Generator, n: int) -> None:
-        self._random, self.n = random, n
-
-    def uniform(self, low: float, high: float) -> Array:
-        """Uniform numbers, shape (n,)."""
-        return self._random.uniform(low, high, self.n)
-
-    def normal(self, *rows: int) -> Array:
-        """Standard normal numbers, shape (*rows, n)."""
-        return self._random.standard_normal((*rows, self.n))
-
-
-class SharedDraws(Draws):
-    """Draws that are generated once and are the same for every pair of peaks."""
-
-    def __init__(self, seed: int, n: int) -> None:
-        super().__init__(np.random.default_rng(seed), n)
-        self._seed = seed
-        self._asked: tuple[tuple[str, tuple[Any, ...]], ...] = ()
-        self._kept: dict[object, Array] = {}
-
-    def again(self) -> "SharedDraws":
-        """Restart the draws from the first one. Returns this object."""
-        self._asked = ()
-        return self
-
-    def uniform(self, low: float, high: float) -> Array:
-        return self._repeated("uniform", low, high, self.n)
-
-    def normal(self, *rows: int) -> Array:
-        return self._repeated("standard_normal", (*rows, self.n))
-
-    def _repeated(self, kind: str, *arguments: Any) -> Array:
-        self._asked += ((kind, arguments),)
-        if self._asked not in self._kept:
-            # the calls differ from the earlier ones: for example, a zero at rest needs draws that a mean over a cycle
-            # does not need
-            random = np.random.default_rng(self._seed)
-            self._kept[self._asked] = [getattr(random, name)(*given) for name, given in self._asked][-1]
-        return self._kept[self._asked]

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from bench.analysis.cycles import SHARE, Cycle, mean_amplitude, mean_waves, parabola
 from bench.analysis.gain import SteadyPeak
-from bench.analysis.sensor_accuracy import PeakReadings
+from bench.analysis.peak_readings import PeakReadings
 from bench.analysis.signals import ACCELERATION, DRIFT, U1
 from sim.attractor import largest_within
 

@@ -10,11 +10,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bench.analysis.cycles import Cycle, fit_cycle
+from bench.analysis.draws import Draws
 from bench.analysis.gain import DRAWS, SEED, SensorAccuracy, SteadyPeak, gain, steady_peak
 from bench.analysis.laser_calibration import LaserCalibration
 from bench.analysis.linearity import LinearFrame
+from bench.analysis.peak_readings import PeakReadings
 from bench.analysis.running_gain import shared_draws
-from bench.analysis.sensor_accuracy import SCALES, STEPS, Draws, PeakReadings, SensorUncertainty
+from bench.analysis.sensor_accuracy import SCALES, STEPS, SensorUncertainty
 from bench.analysis.signals import ACCELERATION, DRIFT, LASER_2
 from bench.analysis.unsteady_peaks import unsteady_peaks
 from sim.specimen import Specimen

@@ -9,8 +9,9 @@ import pytest
 from bench.analysis import error_curve, remaining_transient, sensor_accuracy
 from bench.analysis.error_curve import Harmonics
 from bench.analysis.gain import SteadyPeak, gain
+from bench.analysis.peak_readings import PeakReadings
 from bench.analysis.running_gain import CHANGED, RunningGain, shared_draws
-from bench.analysis.sensor_accuracy import PeakReadings, SensorAccuracy, SensorUncertainty
+from bench.analysis.sensor_accuracy import SensorAccuracy, SensorUncertainty
 
 SENSORS = SensorUncertainty(SensorAccuracy(), (0.2, 0.2))
 PHASES = np.arange(32) * (2.0 * np.pi / 32)
