@@ -6,7 +6,7 @@ from numpy.random import SeedSequence
 from numpy.typing import NDArray
 
 from sim.filter_unit import FilterUnit
-from sim.sensors import Accelerometer, Converter, DisplacementSensor, Laser
+from sim.sensors import PORTION, Accelerometer, Converter, DisplacementSensor, Laser, NormalNumbers
 
 Array = NDArray[np.float64]
 
@@ -61,6 +61,14 @@ def test_the_linearity_error_has_its_size_and_a_seeded_phase() -> None:
     assert np.abs(errors[0][100:]).max() == pytest.approx(0.001 * 0.2, rel=0.05)
     np.testing.assert_array_equal(errors[0], errors[1])
     assert np.abs(errors[0] - errors[2]).max() > 1e-5
+
+
+def test_normal_numbers_do_not_depend_on_how_they_are_taken() -> None:
+    taken = NormalNumbers(np.random.default_rng(1), np.random.default_rng(2))
+    parts = [taken.take(n) for n in (0, 3, PORTION, 1, 2 * PORTION + 5, 200)]
+    found = np.concatenate(parts, axis=1)
+    for row, seed in zip(found, (1, 2), strict=True):
+        np.testing.assert_array_equal(row, np.random.default_rng(seed).standard_normal(row.size))
 
 
 def test_noise_of_a_measurement_is_that_stated() -> None:

@@ -6,10 +6,11 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 
-from bench.analysis import error_curve, remaining_transient, sensor_accuracy
+from bench.analysis import error_curve, remaining_transient, rounding, sensor_accuracy
 from bench.analysis.error_curve import Harmonics
 from bench.analysis.gain import SteadyPeak, gain
 from bench.analysis.peak_readings import PeakReadings
+from bench.analysis.rounding import FittedPeak
 from bench.analysis.running_gain import CHANGED, RunningGain, shared_draws
 from bench.analysis.sensor_accuracy import SensorAccuracy, SensorUncertainty
 
@@ -77,6 +78,28 @@ def test_the_uncertainty_of_a_changed_motion_is_that_of_the_result_to_a_hundredt
     expected = gain(changed, bare, SENSORS)
     assert found.alpha_2 == expected.alpha_2
     assert found.uncertainty == pytest.approx(expected.uncertainty, rel=0.01)
+
+
+def fitted(found: SteadyPeak) -> SteadyPeak:
+    """The peak with the harmonics of its readings, so that the variance due to their resolution is evaluated."""
+    harmonics = np.zeros((2, 4, 6), dtype=np.complex128)
+    harmonics[:, :, 1] = (0.5 * np.array(found.readings.swings))[:, None]
+    return replace(found, readings=replace(found.readings, fitted=FittedPeak(harmonics, 0.0, 5)))
+
+
+@pytest.mark.parametrize("change", [0.9 * CHANGED, -0.9 * CHANGED])
+@pytest.mark.parametrize("drift", [0.002, 0.01, 0.03])
+def test_the_resolution_is_evaluated_again_only_after_a_change(drift: float, change: float) -> None:
+    bare = fitted(BARE)
+    running = RunningGain(bare, SENSORS, SHARED)
+    running.of(fitted(peak(drift)))
+    nearby, further = (fitted(peak(drift * (1.0 + each))) for each in (change, 5.0 * change))
+    with patch.object(rounding, "_values", wraps=rounding._values) as evaluated:
+        found = running.of(nearby)
+        assert not evaluated.called
+        running.of(further)
+        assert evaluated.called
+    assert found.uncertainty == pytest.approx(gain(nearby, bare, SENSORS).uncertainty, rel=0.01)
 
 
 def test_a_further_change_or_another_side_is_evaluated_again() -> None:
