@@ -95,13 +95,16 @@ class FilterStream:
         self._state = self._new
 
     def state(self, channels: int) -> "FilterState":
-        """State of the cards of so many channels, which must be the same in all calls."""
+        """State of the cards of so many channels. Raises ValueError if their number changes."""
         if self._state is self._new:
             self._state = self._new._replace(states=np.zeros((len(self._new.sections), channels, 2)))
+        if self._state.states.shape[1] != channels:
+            raise ValueError(f"{channels} channels on filter cards for {self._state.states.shape[1]}")
         return self._state
 
     def read(self, volts: Array) -> Array:
         """Filter voltages, shape (n_channels, n). Returns an array of the same shape."""
         filtered = np.array(volts, dtype=np.float64, order="C")
-        self._cascade(self.state(len(filtered)), filtered)
+        if filtered.size:
+            self._cascade(self.state(len(filtered)), filtered)
         return filtered

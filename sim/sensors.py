@@ -93,7 +93,9 @@ class Laser(Parameters):
 
 
 class LaserStream:
-    """Running laser, which converts the target's motion at the ticks to the output at the ticks."""
+    """Running laser, which converts the target's motion at the ticks to the output at the ticks. `state` is for
+    `sim.kernel.instruments`, which reads all instruments at once.
+    """
 
     def __init__(self, laser: Laser, sample_rate: float, seed: SeedSequence) -> None:
         from sim.kernel.laser import LaserState, measure
@@ -135,7 +137,8 @@ class LaserStream:
     def read(self, displacement: Array, velocity: Array) -> Array:
         """Output [V] at each tick, shape (n,), for the position [m] and velocity [m/s] of the target, shape (n,)."""
         volts = np.empty(displacement.size)
-        self._measure(self.state, self.noise(displacement.size), displacement, velocity, volts)
+        if volts.size:
+            self._measure(self.state, self.noise(displacement.size), displacement, velocity, volts)
         return volts
 
 

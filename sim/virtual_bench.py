@@ -258,7 +258,8 @@ class VirtualBench:
     def _move(self, volts: Array) -> None:
         shaker, n = self.parameters.shaker, volts.size
         # numpy's clip takes several times as long for short blocks
-        requests = shaker.gain * np.minimum(np.maximum(volts, -shaker.drive_range), shaker.drive_range)
+        limited = np.minimum(np.maximum(volts, -shaker.drive_range), shaker.drive_range)
+        requests = shaker.gain * np.ascontiguousarray(limited, dtype=np.float64)
         noise = self._force_level * self._force_noise.take(n)[0]
         self._samples = np.empty((n, self._kernel.COLUMNS))
         start = 0

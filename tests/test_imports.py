@@ -48,3 +48,12 @@ def test_the_kernel_is_loaded_without_linear_algebra_which_numba_still_finds_whe
         "assert np.array_equal(product(x)[0], x @ x) and np.allclose(product(x)[1], np.cov(x))\n"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_the_kernel_is_loaded_without_packages_that_numba_only_looks_for_and_leaves_them_importable() -> None:
+    code = (
+        "import sys, sim.kernel.compiled, sim.kernel.steps; hidden = 'cffi', 'coverage', 'yaml'\n"
+        "assert not [name for name in sys.modules if name.partition('.')[0] in hidden]\n"
+        "import coverage"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)

@@ -21,10 +21,10 @@ class Source:
     measure: str
 
 
-_CALIBRATE = "calibrate the lasers (laser calibration test; after it, with a more linear displacement sensor)"
+_CALIBRATE = "calibrate the lasers (laser calibration test)"
 _CALIBRATE_TABLE = (
-    "calibrate the accelerometer (against the lasers: laser calibration test; after it, by a laboratory, whose "
-    "uncertainty is analysis.table_scale)"
+    "calibrate the accelerometer (against the lasers: laser calibration test; in addition by a laboratory, with the "
+    "stated standard uncertainty as analysis.table_scale)"
 )
 _FASTER = "increase the measuring rate of the lasers"
 _FINER = "use a laser with a finer resolution or a shorter range"

@@ -45,23 +45,29 @@ def _period(harmonics: int) -> NDArray[np.float64]:
     return harmonic_basis(_ANGLES, harmonics)
 
 
+_KEPT = 2**19
+"""Largest number of elements of a basis that is kept for further cycles [1]; four larger ones would take over 32 MB."""
+
+
 @lru_cache(maxsize=4)
 def _equal_steps(step: float, n: int, harmonics: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """`harmonic_basis` at `n` phases 0, step, 2 step, ..., and its pseudoinverse, shape (1 + 2 harmonics, n)."""
     basis = harmonic_basis(step * np.arange(n, dtype=np.float64), harmonics)
-    return basis, np.linalg.solve(basis.T @ basis, basis.T).astype(np.float64)
+    inverse = np.linalg.solve(basis.T @ basis, basis.T).astype(np.float64)
+    basis.flags.writeable = inverse.flags.writeable = False
+    return basis, inverse
 
 
-def _turned(coefficients: NDArray[np.float64], phase: float) -> NDArray[np.float64]:
+def _shifted(coefficients: NDArray[np.float64], phase: float) -> NDArray[np.float64]:
     """Coefficients of `harmonic_basis`, shape (1 + 2 H, m), for phases that are larger by `phase` [rad]."""
     harmonics = (len(coefficients) - 1) // 2
     angles = phase * np.arange(1.0, harmonics + 1.0)[:, None]
     cosine, sine = np.cos(angles), np.sin(angles)
-    before, after = coefficients[1 : 1 + harmonics], coefficients[1 + harmonics :]
-    turned = coefficients.copy()
-    turned[1 : 1 + harmonics] = cosine * before - sine * after
-    turned[1 + harmonics :] = sine * before + cosine * after
-    return turned
+    cosines, sines = coefficients[1 : 1 + harmonics], coefficients[1 + harmonics :]
+    shifted = coefficients.copy()
+    shifted[1 : 1 + harmonics] = cosine * cosines - sine * sines
+    shifted[1 + harmonics :] = sine * cosines + cosine * sines
+    return shifted
 
 
 @dataclass(frozen=True)
@@ -117,7 +123,8 @@ def fit_cycle(
     """Fit samples `values`, shape (n, m), at `phase` [rad] up to the harmonic `highest`, or up to a lower harmonic if
     there are few samples. Returns None if too many samples are missing (NaN) or there are too few for one harmonic.
 
-    If the phases have equal steps, `step` [rad] makes further fits with the same step faster.
+    If the phases have equal steps of `step` [rad], only the first phase is used, and further fits with this step are
+    faster.
     """
     finite = np.isfinite(values)
     share, traces, every = 1.0, _traces(values, finite), phase
@@ -127,10 +134,10 @@ def fit_cycle(
     harmonics = min(highest, (phase.size - 1) // 4)
     if share < COMPLETE or harmonics < 1:
         return None
-    if step is not None and share == 1.0:
+    if step is not None and share == 1.0 and phase.size * (1 + 2 * harmonics) <= _KEPT:
         basis, inverse = _equal_steps(step, phase.size, harmonics)
         found = inverse @ values
-        residual, coefficients = values - basis @ found, _turned(found, float(phase[0]))
+        residual, coefficients = values - basis @ found, _shifted(found, float(phase[0]))
     else:
         basis = harmonic_basis(phase, harmonics)
         coefficients = np.linalg.solve(basis.T @ basis, basis.T @ values).astype(np.float64)

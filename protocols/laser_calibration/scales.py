@@ -2,7 +2,7 @@
 
 The standard of length is the weighted mean (`protocols.laser_calibration.standards`) of the mean span of both lasers,
 whose scale error over the passes follows from the linearity error on their data sheets, and of the span computed from
-the accelerometer, which has less weight.
+the accelerometer.
 """
 
 from collections.abc import Sequence
@@ -10,6 +10,7 @@ from datetime import datetime
 from math import hypot, sqrt
 
 import numpy as np
+from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
 from bench.analysis.laser_calibration import LaserCalibration, LaserCurve
@@ -44,7 +45,8 @@ def calibration(
     by_lasers = 1.0 / (1.0 - 0.5 * sum(slopes))
     ratios = np.array([each.ratio for each in passes])
     standard = standards(curves, accuracy, ranges)
-    corrected, uncertainty = standard.combined(by_lasers * float(ratios.mean()))
+    scatter = np.hypot(np.std(ratios, ddof=1) / sqrt(len(passes)), jackknife((curves[0].slopes + curves[1].slopes) / 2))
+    corrected, uncertainty = standard.combined(by_lasers * float(ratios.mean()), float(scatter))
     # ratio of the true displacement to that measured by the table's sensor
     factor = by_lasers * corrected
     found = [
@@ -62,9 +64,9 @@ def calibration(
         for curve, rest, device, slope in zip(curves, rests, devices, slopes, strict=True)
     ]
     span = _span(curves)
-    # two lasers that disagree by more than they should leave half of the excess to their mean
+    # two lasers that disagree by more than they should leave half of the excess to their mean; since one of them must
+    # have a fault that nobody has found, the accelerometer does not reduce it
     excess = 0.5 * sqrt(max((slopes[1] - slopes[0]) ** 2 - (COVERAGE * standard.apart) ** 2, 0.0))
-    scatter = np.hypot(np.std(ratios, ddof=1) / sqrt(len(passes)), jackknife((curves[0].slopes + curves[1].slopes) / 2))
     # an error due to higher orders at both ends, as large as at any reading
     bent = sqrt(2.0) * np.hypot(curves[0].residual, curves[1].residual) / span
     return LaserCalibration(
@@ -109,12 +111,22 @@ def disagreements(
             f"({100.0 * bound:.2f} %): check their ranges and the load resistors of analogue outputs; the uncertainty "
             "of the table's scale contains the difference"
         )
-    bound = IMPLAUSIBLE * hypot(standard.lasers, standard.table)
     for name, factor in (("displacement", found.table_displacement), ("acceleration", found.table_acceleration)):
-        if abs(factor - 1.0) > bound:
+        if not abs(factor - 1.0) <= standard.bound:
             remarks.append(
                 f"the scale of the table's {name} differs by {100.0 * (factor - 1.0):+.2f} % from that of the lasers, "
-                f"more than the data sheets allow ({100.0 * bound:.2f} %): check its sensitivity in the configuration"
+                f"more than the data sheets allow ({100.0 * standard.bound:.2f} %): check its sensitivity in the "
+                "configuration"
+            )
+    limits = [configuration.analysis.laser_linearity * whole for whole in configuration.laser_ranges]
+    for number, (curve, limit) in enumerate(zip(curves, limits, strict=True), 1):
+        places = np.linspace(-1.0, 1.0, curve.without.shape[1])
+        # a curve within the limits differs from its straight line by less than twice the limit
+        bent = float(np.abs(chebyshev.chebval(places, [0.0, 0.0, *curve.error[2:]])).max())
+        if bent > (most := 2.0 * limit + found.common_linearity):
+            remarks.append(
+                f"the linearity error of laser_{number} is {1e6 * bent:.0f} um, more than the data sheets allow "
+                f"({1e6 * most:.0f} um): check its range, its target and analysis.laser_linearity"
             )
     return remarks
 

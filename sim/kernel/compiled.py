@@ -25,19 +25,23 @@ from sim.kernel.cache import KERNEL, KernelCache
 
 @contextmanager
 def _absent(*names: str) -> Generator[None, None, None]:
-    """Context manager in which packages count as not installed unless they have already been imported."""
-    hidden = [name for name in names if name not in sys.modules]
-    sys.modules.update(cast(Any, dict.fromkeys(hidden)))
+    """Context manager in which packages cannot be imported unless they have already been imported."""
+    modules = cast(dict[str, Any], sys.modules)
+    hidden = [name for name in names if name not in modules]
+    modules.update(dict.fromkeys(hidden))
     try:
         yield
     finally:
         for name in hidden:
-            del sys.modules[name]
+            # another thread may have imported it meanwhile
+            if modules.get(name, name) is None:
+                del modules[name]
 
 
-# numba imports these wherever they are installed, but needs none of them here: a tenth of the time of a short command.
-# No other thread imports them meanwhile, because nothing else in this program uses them
-with _absent("cffi", "coverage", "yaml"):
+# numba imports these wherever they are installed, a tenth of the time of a short command: cffi for compiled functions
+# that call C libraries, of which there are none here, coverage to report what it compiles, yaml for a file of settings
+_SETTINGS_FILE = Path(".numba_config.yaml")
+with _absent("cffi", "coverage", *([] if _SETTINGS_FILE.exists() else ["yaml"])):
     import llvmlite.binding
     import numba
     import numba.np.linalg
@@ -90,8 +94,8 @@ def generic(function: F) -> F:
     return cast(F, cast(Any, register_jitable)(**options)(function))
 
 
-def compiled(signature: str) -> Callable[[F], F]:
-    """Compile a function for one numba `signature`, for example ``"float64(float64[::1])"``."""
+def compiled(signature: object) -> Callable[[F], F]:
+    """Compile a function for one numba `signature`, for example ``"float64(float64[::1])"``, or an object of numba."""
 
     def decorate(function: F) -> F:
         with _one_at_a_time:
@@ -152,6 +156,6 @@ def _cache_of(function: Callable[..., Any]) -> KernelCache:
     return _caches[folder]
 
 
-def _njit(signature: str, function: F, *, cache: bool) -> F:
+def _njit(signature: object, function: F, *, cache: bool) -> F:
     decorator = cast(Any, numba.njit)(signature, cache=cache, nogil=True, error_model="numpy", no_cfunc_wrapper=True)
     return cast(F, decorator(function))

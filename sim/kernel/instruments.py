@@ -26,7 +26,7 @@ LEVEL, SLOPE, ZERO = range(3)
 """Columns of the constants of linear sensors: noise [unit], sensitivity [V/unit], voltage at zero [V]."""
 
 _X, _V, _U, _RATES, _A = 0, 1, 2, 4, 8
-"""Columns of the samples of `sim.kernel.table`: table, both storeys, their rates, mean acceleration of the table."""
+"""Columns of the samples: table, both targets of the lasers, their rates, mean acceleration of the table."""
 
 _FIRST_LASER = 2
 """Row of the first laser's channel."""
@@ -56,7 +56,7 @@ def digitise_motion(
 ) -> None:
     """Write the counts of all channels, shape (channels, n): displacement sensor, accelerometer, lasers, `further`.
 
-    samples : shape (n, 9), of `sim.kernel.table.stream`; both lasers measure u, or x + u if they are `grounded`.
+    samples : shape (n, 9), of `sim.arrangement.targets`; both lasers measure u, or x + u if they are `grounded`.
     further : shape (m, n), values [unit] for the further linear sensors.
     linear_noise, linear : standard normal numbers, shape (2 + m, n), and constants, shape (2 + m, 3), of displacement
     sensor, accelerometer and further sensors. The noise of the lasers is that of `sim.kernel.laser.measure`; the

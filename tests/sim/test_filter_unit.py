@@ -41,6 +41,15 @@ def test_a_stream_is_filtered_as_by_scipy_bit_for_bit_whatever_the_blocks(order:
     np.testing.assert_array_equal(volts, before)
 
 
+def test_the_cards_have_a_fixed_number_of_channels_and_an_empty_block_changes_nothing() -> None:
+    volts = np.random.default_rng(1).standard_normal((3, 40))
+    whole, cut = (FilterUnit().stream(2000.0) for _ in range(2))
+    assert cut.read(volts[:, :0]).shape == (3, 0)
+    np.testing.assert_array_equal(cut.read(volts), whole.read(volts))
+    with pytest.raises(ValueError, match="4 channels on filter cards for 3"):
+        whole.read(np.zeros((4, 5)))
+
+
 @pytest.mark.parametrize("forget", [0.0, 0.5, 1.0 - 1e-5])
 def test_an_exponential_mean_is_that_of_scipy_bit_for_bit_whatever_the_blocks(forget: float) -> None:
     values = np.random.default_rng(1).uniform(0.0, 100.0, 1000)

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -55,27 +57,34 @@ def test_single_samples_are_the_block() -> None:
     np.testing.assert_array_equal(np.concatenate([cut.run(volts[i : i + 1]) for i in range(600)]), expected)
 
 
+@pytest.mark.parametrize("watched", [None, 0.1])
 @pytest.mark.parametrize("reference", ["ground", "table"])
-def test_counts_are_those_of_the_instruments_one_by_one(reference: str) -> None:
+def test_counts_are_those_of_the_instruments_one_by_one(reference: str, watched: float | None) -> None:
     parts: dict[str, object] = {
         "laser_1": {"reference": reference, "latency": 5, "rate": 1000.0},
-        "laser_2": {"reference": reference},
+        "laser_2": {"reference": reference, "latency": 0},
         "converter": {"clock_error": 2e-5},
     }
-    bench = bench_with(Specimen(beta=0.4), 11, **parts)
-    counts, truth, p = bench.run(kick(1500)), bench.truth, bench.parameters
-    sources, rate, (x1, v1, x2, v2) = SeedSequence(11).spawn(7), p.tick_rate, bench.sights
+    further = _further("displacement", "table")
+    p = VirtualBenchParameters.model_validate(parts)
+    bench = VirtualBench(p, Specimen(beta=0.4), 11, [further])
+    bench.mount(replace(bench.arrangement, watched=watched))
+    counts, truth = bench.run(kick(1500)), bench.truth
+    sources, rate, (x1, v1, x2, v2) = SeedSequence(11).spawn(8), p.tick_rate, bench.sights
     volts = np.array(
         [
             p.displacement_sensor.volts(truth.x, rate, np.random.default_rng(sources[1])),
             p.accelerometer.volts(truth.a, rate, np.random.default_rng(sources[2])),
             p.laser_1.stream(rate, sources[3]).read(x1, v1),
             p.laser_2.stream(rate, sources[4]).read(x2, v2),
+            further.volts(truth.x, rate, np.random.default_rng(sources[7])),
         ]
     )
     filtered = p.filter_unit.stream(rate).read(volts).T
     np.testing.assert_array_equal(counts, p.converter.counts(filtered, np.random.default_rng(sources[5])))
     np.testing.assert_array_equal(x1, truth.u1 + (truth.x if reference == "ground" else 0.0))
+    followed = np.allclose(x2 - x1, truth.u2 - truth.u1, rtol=0.0, atol=1e-12)
+    assert followed == (watched is None)
 
 
 def test_a_seed_is_a_bench() -> None:

@@ -111,6 +111,24 @@ def test_lasers_that_disagree_are_told_and_leave_their_difference_to_the_scale()
     assert stated[0] < 0.002
 
 
+def test_an_error_beyond_the_data_sheet_and_a_wrong_sensitivity_are_told() -> None:
+    passes, curves, rests = curves_of(1.0)
+
+    def told(curves: tuple[ErrorCurve, ErrorCurve], passes: list[Pass]) -> list[str]:
+        one = calibration(
+            passes, curves, rests, ("A", "B"), SensorAccuracy(), (RANGE, RANGE), reference_linearity=5e-4,
+            valid_days=30.0, date=datetime(2026, 5, 4, 12, tzinfo=UTC),
+        )  # fmt: skip
+        return disagreements(one, curves, BenchConfiguration())
+
+    assert told(curves, passes) == []
+    bent = replace(curves[1], error=curves[1].error + np.array([0.0, 0.0, 5e-4, *np.zeros(curves[1].error.size - 3)]))
+    (remark,) = told((curves[0], bent), passes)
+    assert "linearity error of laser_2" in remark
+    (remark,) = told(curves, [replace(each, ratio=1.03 * each.ratio) for each in passes])
+    assert "table's acceleration differs by +2.86 %" in remark
+
+
 @pytest.mark.parametrize("scale", [0.0, 1.06, -1.0])
 def test_a_laser_that_does_not_follow_the_table_is_not_calibrated(scale: float) -> None:
     """Aimed at a fixed part, on a wrong range, or inverted."""
