@@ -47,6 +47,9 @@ with _absent("cffi", "coverage", *([] if _SETTINGS_FILE.exists() else ["yaml"]))
     import numba.np.linalg
     from numba.extending import register_jitable
 
+    # otherwise imported when the first function is compiled
+    importlib.import_module("numba.core.typing.cffi_utils")
+
 F = TypeVar("F", bound=Callable[..., Any])
 
 
