@@ -45,31 +45,6 @@ def _period(harmonics: int) -> NDArray[np.float64]:
     return harmonic_basis(_ANGLES, harmonics)
 
 
-_KEPT = 2**19
-"""Largest number of elements of a basis that is kept for further cycles [1]; four larger ones would take over 32 MB."""
-
-
-@lru_cache(maxsize=4)
-def _equal_steps(step: float, n: int, harmonics: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """`harmonic_basis` at `n` phases 0, step, 2 step, ..., and its pseudoinverse, shape (1 + 2 harmonics, n)."""
-    basis = harmonic_basis(step * np.arange(n, dtype=np.float64), harmonics)
-    inverse = np.linalg.solve(basis.T @ basis, basis.T).astype(np.float64)
-    basis.flags.writeable = inverse.flags.writeable = False
-    return basis, inverse
-
-
-def _shifted(coefficients: NDArray[np.float64], phase: float) -> NDArray[np.float64]:
-    """Coefficients of `harmonic_basis`, shape (1 + 2 H, m), for phases that are larger by `phase` [rad]."""
-    harmonics = (len(coefficients) - 1) // 2
-    angles = phase * np.arange(1.0, harmonics + 1.0)[:, None]
-    cosine, sine = np.cos(angles), np.sin(angles)
-    cosines, sines = coefficients[1 : 1 + harmonics], coefficients[1 + harmonics :]
-    shifted = coefficients.copy()
-    shifted[1 : 1 + harmonics] = cosine * cosines - sine * sines
-    shifted[1 + harmonics :] = sine * cosines + cosine * sines
-    return shifted
-
-
 @dataclass(frozen=True)
 class Cycle:
     """One cycle of the drive. The last of the m columns is for the drive [V], the others are for the signals.
@@ -113,18 +88,10 @@ class Cycle:
 
 
 def fit_cycle(
-    index: int,
-    phase: NDArray[np.float64],
-    values: NDArray[np.float64],
-    highest: int = HARMONICS,
-    first: int = 0,
-    step: float | None = None,
+    index: int, phase: NDArray[np.float64], values: NDArray[np.float64], highest: int = HARMONICS, first: int = 0
 ) -> Cycle | None:
     """Fit samples `values`, shape (n, m), at `phase` [rad] up to the harmonic `highest`, or up to a lower harmonic if
     there are few samples. Returns None if too many samples are missing (NaN) or there are too few for one harmonic.
-
-    If the phases have equal steps of `step` [rad], only the first phase is used, and further fits with this step are
-    faster.
     """
     finite = np.isfinite(values)
     share, traces, every = 1.0, _traces(values, finite), phase
@@ -134,14 +101,9 @@ def fit_cycle(
     harmonics = min(highest, (phase.size - 1) // 4)
     if share < COMPLETE or harmonics < 1:
         return None
-    if step is not None and share == 1.0 and phase.size * (1 + 2 * harmonics) <= _KEPT:
-        basis, inverse = _equal_steps(step, phase.size, harmonics)
-        found = inverse @ values
-        residual, coefficients = values - basis @ found, _shifted(found, float(phase[0]))
-    else:
-        basis = harmonic_basis(phase, harmonics)
-        coefficients = np.linalg.solve(basis.T @ basis, basis.T @ values).astype(np.float64)
-        residual = values - basis @ coefficients
+    basis = harmonic_basis(phase, harmonics)
+    coefficients: NDArray[np.float64] = np.linalg.solve(basis.T @ basis, basis.T @ values).astype(np.float64)
+    residual = values - basis @ coefficients
     waveform = _period(harmonics) @ coefficients
     return Cycle(
         index=index,
@@ -314,7 +276,7 @@ class CycleAnalyser:
         while self._start + queue.shape[0] >= self._end():
             n = self._end() - self._start
             phase = self._step * np.arange(self._start, self._start + n, dtype=np.float64)
-            cycle = fit_cycle(self._count, phase, queue[:n], self._highest, self._start, self._step)
+            cycle = fit_cycle(self._count, phase, queue[:n], self._highest, self._start)
             if cycle is not None:
                 cycles.append(cycle)
             queue = queue[n:]

@@ -57,22 +57,6 @@ def test_cycles_do_not_depend_on_the_size_of_the_blocks() -> None:
     assert all(np.array_equal(a.fundamental, b.fundamental) for a, b in zip(whole, parts, strict=True))
 
 
-@pytest.mark.parametrize("first", [0, 7, 123_457])
-@pytest.mark.parametrize("harmonics", [3, 10, 21])
-def test_a_known_step_gives_the_same_fit(first: int, harmonics: int) -> None:
-    step = 17.3 / 2000.0
-    n = int(2.0 * np.pi / step)
-    phase = step * np.arange(first, first + n)
-    noise = 0.01 * np.random.default_rng(2).standard_normal((n, 3))
-    values = _signal(phase, 1.0)[:, None] + noise
-    alone, known = (fit_cycle(0, phase, values, harmonics, first, given) for given in (None, step))
-    assert alone is not None
-    assert known is not None
-    # a phase of a thousand radians is known to 1e-13
-    np.testing.assert_allclose(known.coefficients, alone.coefficients, rtol=0.0, atol=1e-11)
-    np.testing.assert_allclose(known.noise, alone.noise, rtol=1e-9)
-
-
 def test_a_cycle_with_few_missing_samples_is_fitted_and_one_with_many_is_left_out() -> None:
     omega = 16.0
     t = np.arange(700) / 2000.0
