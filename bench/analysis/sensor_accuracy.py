@@ -52,7 +52,12 @@ class SensorAccuracy(Parameters):
         0.0008, "1", "largest linearity error of a laser relative to its range, from its data sheet", ge=0, le=0.05
     )
     table_scale: float = quantity(
-        0.005, "1", "relative error of the scales of the table's accelerometer and displacement sensor", ge=0, le=0.1
+        0.005,
+        "1",
+        "relative error of the scales of the table's accelerometer and displacement sensor; in a laser calibration, "
+        "that of the accelerometer as a standard of length",
+        ge=0,
+        le=0.1,
     )
     timebase: float = quantity(
         3e-5, "1", "relative error of the sample clock: limits of 50 ppm, divided by sqrt(3)", ge=0, le=0.01

@@ -37,12 +37,12 @@ class LaserCalibrationParameters(Parameters):
 
 
 class CalibratedSensor(Parameters):
-    """Calibration of a sensor relative to the mean span of both lasers. Values that do not apply are absent.
-    Uncertainties are expanded (k = 2).
+    """Calibration of a sensor: lasers relative to the mean span of both, sensors of the table relative to the weighted
+    mean of lasers and accelerometer. Values that do not apply are absent. Uncertainties are expanded (k = 2).
     """
 
     sensor: str = quantity(..., "", "channel, or laser_2 / laser_1 for the ratio of the lasers")
-    scale: float = quantity(..., "1", "ratio of reading to true value")
+    scale: float = quantity(..., "1", "ratio of reading to reference")
     scale_uncertainty: float = quantity(..., "1", "expanded uncertainty of the scale (k = 2)")
     lowest_m: float | None = quantity(None, "m", "smallest covered reading")
     highest_m: float | None = quantity(None, "m", "largest covered reading")
