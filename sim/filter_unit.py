@@ -83,21 +83,17 @@ class FilterStream:
     """Running filter cards, already settled at the first sample."""
 
     def __init__(self, sections: Array, settled: Array) -> None:
-        from sim.kernel.filter import FilterState, cascade
+        from sim.kernel import filter as kernel
 
-        self._cascade = cascade
-        self._new = FilterState(
-            np.ascontiguousarray(sections),
-            np.ascontiguousarray(settled),
-            np.empty((len(sections), 0, 2)),
-            np.zeros(1, dtype=np.int64),
-        )
-        self._state = self._new
+        self._kernel = kernel
+        self._sections, self._settled = np.ascontiguousarray(sections), np.ascontiguousarray(settled)
+        self._state: FilterState | None = None
 
     def state(self, channels: int) -> "FilterState":
         """State of the cards of so many channels. Raises ValueError if their number changes."""
-        if self._state is self._new:
-            self._state = self._new._replace(states=np.zeros((len(self._new.sections), channels, 2)))
+        if self._state is None:
+            states, begun = np.zeros((len(self._sections), channels, 2)), np.zeros(1, dtype=np.int64)
+            self._state = self._kernel.FilterState(self._sections, self._settled, states, begun)
         if self._state.states.shape[1] != channels:
             raise ValueError(f"{channels} channels on filter cards for {self._state.states.shape[1]}")
         return self._state
@@ -106,5 +102,5 @@ class FilterStream:
         """Filter voltages, shape (n_channels, n). Returns an array of the same shape."""
         filtered = np.array(volts, dtype=np.float64, order="C")
         if filtered.size:
-            self._cascade(self.state(len(filtered)), filtered)
+            self._kernel.cascade(self.state(len(filtered)), filtered)
         return filtered

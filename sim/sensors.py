@@ -117,21 +117,15 @@ class LaserStream:
                 laser.noise,
             ]
         )
-        self._per_tick, self._phase = laser.rate * (1.0 + laser.clock_error) / sample_rate, phase
-        clock = np.array([self._per_tick, phase, 1.0 / sample_rate])
-        self.state = LaserState(
-            constants,
-            clock,
-            np.array([0, floor(-phase) - laser.latency]),
-            np.zeros(2),
-            np.empty(laser.latency + 1),
-        )
+        clock = np.array([laser.rate * (1.0 + laser.clock_error) / sample_rate, phase, 1.0 / sample_rate])
+        counters = np.array([0, floor(-phase) - laser.latency], dtype=np.int64)
+        self.state = LaserState(constants, clock, counters, np.zeros(2), np.empty(laser.latency + 1))
         self._normals = NormalNumbers(random)
 
     def noise(self, ticks: int) -> Array:
         """Standard normal numbers for the measurements that are new at the end of the next `ticks`, shape (m,)."""
-        tick, following = self.state.counters.tolist()
-        newest = floor((tick + ticks - 1) * self._per_tick - self._phase)
+        (tick, following), (per_tick, phase, _) = self.state.counters.tolist(), self.state.clock.tolist()
+        newest = floor((tick + ticks - 1) * per_tick - phase)
         return self._normals.take(newest + 1 - following)[0]
 
     def read(self, displacement: Array, velocity: Array) -> Array:

@@ -116,7 +116,6 @@ class VirtualBench:
         self._laser_2 = parameters.laser_2.stream(rate, sources[4])
         self._input_noise = NormalNumbers(np.random.default_rng(sources[5]))
         self._velocities = np.zeros(3)
-        self._no_values = np.empty((0, 0))
         self._held_for: int | None = None
         self._cards = parameters.filter_unit.stream(rate).state(len(self._linear) + 2)
         step = min(_LONGEST_STEP, parameters.shaker.shortest_time / _STEPS_PER_TIME_CONSTANT)
@@ -288,7 +287,7 @@ class VirtualBench:
     def _further_values(self) -> Array:
         """Values at the further sensors [unit], shape (m, n)."""
         if not self._further:
-            return self._no_values
+            return np.empty((0, 0))
         motion = self._motion(self._samples.T)
         return np.array([motion[sensor.measures][_PLACES.index(sensor.place)] for sensor in self._further])
 

@@ -18,7 +18,7 @@ from bench.analysis.sensor_accuracy import SensorAccuracy
 from bench.analysis.uncertainty import COVERAGE
 from bench.config.model import BenchConfiguration
 from protocols.common.calibrate import Unmeasurable
-from protocols.laser_calibration.curves import ErrorCurve, Pass, jackknife
+from protocols.laser_calibration.curves import READINGS, ErrorCurve, Pass, jackknife
 from protocols.laser_calibration.standards import IMPLAUSIBLE, standards
 
 Array = NDArray[np.float64]
@@ -102,7 +102,9 @@ def require_agreement(curves: tuple[ErrorCurve, ErrorCurve]) -> None:
 def disagreements(
     found: LaserCalibration, curves: tuple[ErrorCurve, ErrorCurve], configuration: BenchConfiguration
 ) -> list[str]:
-    """Remarks on sensors whose scales differ by more than `IMPLAUSIBLE` times the uncertainty of their difference."""
+    """Remarks on sensors whose scales differ by more than `IMPLAUSIBLE` times the uncertainty of their difference, and
+    on lasers with a linearity error that the data sheets do not allow.
+    """
     standard = standards(curves, configuration.analysis, configuration.laser_ranges)
     lasers, remarks = curves[1].slope - curves[0].slope, list[str]()
     if abs(lasers) > (bound := IMPLAUSIBLE * standard.apart):
@@ -119,8 +121,8 @@ def disagreements(
                 "configuration"
             )
     limits = [configuration.analysis.laser_linearity * whole for whole in configuration.laser_ranges]
+    places = np.linspace(-1.0, 1.0, READINGS)
     for number, (curve, limit) in enumerate(zip(curves, limits, strict=True), 1):
-        places = np.linspace(-1.0, 1.0, curve.without.shape[1])
         # a curve within the limits differs from its straight line by less than twice the limit
         bent = float(np.abs(chebyshev.chebval(places, [0.0, 0.0, *curve.error[2:]])).max())
         if bent > (most := 2.0 * limit + found.common_linearity):

@@ -52,6 +52,13 @@ with _absent("cffi", "coverage", *([] if _SETTINGS_FILE.exists() else ["yaml"]))
 
 F = TypeVar("F", bound=Callable[..., Any])
 
+# signatures with types of tuples cannot be written as strings; the types of numba are untyped
+FLOAT: Any = numba.types.float64
+INT: Any = numba.types.int64
+VOID: Any = numba.types.void
+ROW: Any = FLOAT[::1]
+GRID: Any = FLOAT[:, ::1]
+
 
 def _load_array_functions() -> None:
     """Import numba's array functions without scipy.linalg, an eighth of the processor time of a short command.

@@ -12,7 +12,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from sim.kernel.compiled import compiled
+from sim.kernel.compiled import FLOAT, GRID, INT, VOID, compiled
 
 Array = NDArray[np.float64]
 
@@ -31,13 +31,10 @@ class FilterState(NamedTuple):
     begun: NDArray[np.int64]
 
 
-# the type of FILTER cannot be written as a string, so the signature is a numba object, which is untyped
-_VOID: Any = types.void
-GRID: Any = types.float64[:, ::1]
-FILTER: Any = types.NamedTuple((GRID, GRID, types.float64[:, :, ::1], types.int64[::1]), FilterState)
+FILTER: Any = types.NamedTuple((GRID, GRID, FLOAT[:, :, ::1], INT[::1]), FilterState)
 
 
-@compiled(_VOID(FILTER, GRID))
+@compiled(VOID(FILTER, GRID))
 def cascade(cards: FilterState, volts: Array) -> None:
     """Filter `volts`, shape (channels, n), in place. The cards are settled at the first sample."""
     sections, states = cards.sections, cards.states

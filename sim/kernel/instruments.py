@@ -11,16 +11,13 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from sim.kernel.compiled import compiled
-from sim.kernel.filter import FILTER, GRID, FilterState, cascade, digitise
-from sim.kernel.laser import LASER, ROW, LaserState, measure
+from sim.kernel.compiled import FLOAT, GRID, INT, ROW, VOID, compiled
+from sim.kernel.filter import FILTER, FilterState, cascade, digitise
+from sim.kernel.laser import LASER, LaserState, measure
 
 Array = NDArray[np.float64]
 
-_FLOAT: Any = types.float64
-_INT: Any = types.int64
 _COUNTS: Any = types.int16[:, ::1]
-_VOID: Any = types.void
 
 LEVEL, SLOPE, ZERO = range(3)
 """Columns of the constants of linear sensors: noise [unit], sensitivity [V/unit], voltage at zero [V]."""
@@ -29,13 +26,12 @@ _X, _V, _U, _RATES, _A = 0, 1, 2, 4, 8
 """Columns of the samples: table, both targets of the lasers, their rates, mean acceleration of the table."""
 
 _FIRST_LASER = 2
-"""Row of the first laser's channel."""
+"""Row of the first laser's channel; the linear sensors have the rows before it and after the second laser."""
+
+_GIVEN = (GRID, INT, GRID, FLOAT[:, :], GRID, LASER, ROW, LASER, ROW, FILTER, GRID, FLOAT, FLOAT, INT, INT)
 
 
-_SIGNATURE = (GRID, _INT, GRID, _FLOAT[:, :], GRID, LASER, ROW, LASER, ROW, FILTER, GRID, _FLOAT, _FLOAT, _INT, _INT)
-
-
-@compiled(_VOID(*_SIGNATURE, _COUNTS))
+@compiled(VOID(*_GIVEN, _COUNTS))
 def digitise_motion(
     samples: Array,
     grounded: int,
@@ -65,9 +61,10 @@ def digitise_motion(
     n = samples.shape[0]
     volts = np.empty((linear.shape[0] + 2, n))
     for k in range(linear.shape[0]):
-        row = volts[k if k < _FIRST_LASER else k + 2]
+        later = k - _FIRST_LASER
+        row = volts[k if later < 0 else k + 2]
         for i in range(n):
-            value = further[k - 2, i] if k > 1 else samples[i, _A if k == 1 else _X]
+            value = further[later, i] if later >= 0 else samples[i, _A if k == 1 else _X]
             row[i] = (linear_noise[k, i] * linear[k, LEVEL] + value) * linear[k, SLOPE] + linear[k, ZERO]
     x, v = np.empty(n), np.empty(n)
     for storey in range(2):

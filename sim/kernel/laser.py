@@ -14,7 +14,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from sim.kernel.compiled import compiled
+from sim.kernel.compiled import INT, ROW, VOID, compiled
 
 Array = NDArray[np.float64]
 
@@ -45,10 +45,7 @@ class LaserState(NamedTuple):
     taken: Array
 
 
-# the type of LASER cannot be written as a string, so the signatures are numba objects, which are untyped
-_VOID: Any = types.void
-ROW: Any = types.float64[::1]
-LASER: Any = types.NamedTuple((ROW, ROW, types.int64[::1], ROW, ROW), LaserState)
+LASER: Any = types.NamedTuple((ROW, ROW, INT[::1], ROW, ROW), LaserState)
 
 
 @compiled("float64(float64, float64[::1])")
@@ -64,7 +61,7 @@ def output(displacement: float, constants: Array) -> float:
     return constants[LOAD] * constants[ERROR_CURRENT]
 
 
-@compiled(_VOID(LASER, ROW, ROW, ROW, ROW))
+@compiled(VOID(LASER, ROW, ROW, ROW, ROW))
 def measure(laser: LaserState, normal: Array, x: Array, v: Array, volts: Array) -> None:
     """Write the output at each tick to `volts`, shape (n,).
 

@@ -21,7 +21,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from sim.kernel.compiled import compiled
+from sim.kernel.compiled import FLOAT, INT, ROW, VOID, compiled
 
 Array = NDArray[np.float64]
 
@@ -70,13 +70,7 @@ class Plant(NamedTuple):
     lag: float
 
 
-# the type of PLANT cannot be written as a string, so the signatures here are numba objects, which are untyped
-FLOAT: Any = types.float64
-INT: Any = types.int64
-VOID: Any = types.void
 PLANT: Any = types.NamedUniTuple(FLOAT, len(Plant._fields), Plant)
-ROW: Any = FLOAT[::1]
-GRID: Any = FLOAT[:, ::1]
 
 
 @compiled(FLOAT(FLOAT, FLOAT, FLOAT, PLANT))

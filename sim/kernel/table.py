@@ -12,19 +12,14 @@ import math
 import numpy as np
 from numba import types
 
-from sim.kernel.compiled import compiled
+from sim.kernel.compiled import FLOAT, GRID, INT, ROW, VOID, compiled
 from sim.kernel.plant import (
     FALLEN,
-    FLOAT,
-    GRID,
-    INT,
     PLANT,
     REST,
     ROCK_A,
     ROCK_B,
-    ROW,
     STATES,
-    VOID,
     Array,
     Plant,
     overturning_moment,
