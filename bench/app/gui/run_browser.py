@@ -84,7 +84,8 @@ class RunBrowser(QWidget):
         self.choose, self.back = QPushButton(texts.RUNS_FOLDER), QPushButton(texts.RUNS_BACK)
         self.message, self.table = ElidingLabel(), _Table()
         self._unread = list[Found]()
-        self._problem, self._opening, self._compared = "", "", list[Path]()
+        self._problem, self._warning, self._opening = "", "", ""
+        self._compared = list[Path]()
         self._current: Path | None = None
         self._reader, self._watch = Reader(self), QFileSystemWatcher(self)
         self._again = QTimer(self, interval=AGAIN)
@@ -116,6 +117,7 @@ class RunBrowser(QWidget):
     def use_folder(self, folder: Path) -> None:
         """List the runs of another folder."""
         self.folder, self._real = folder, folder.absolute()
+        self._warning = ""
         self._mark()
         self.look()
 
@@ -130,13 +132,15 @@ class RunBrowser(QWidget):
         self._say()
 
     def warn(self, problem: str) -> None:
-        """Show a problem until the folder is listed again."""
-        self._problem = f"▲ {problem}"
+        """Show a problem until another file is opened, the list is searched, or another folder is listed."""
+        self._warning = f"▲ {problem}"
         self._say()
 
     def show_opening(self, text: str) -> None:
         """Name the file that is being opened; an empty text ends it."""
         self._opening = text
+        if text:
+            self._warning = ""
         self._say()
 
     def showEvent(self, event: QShowEvent) -> None:
@@ -195,6 +199,7 @@ class RunBrowser(QWidget):
         self._say()
 
     def _search(self, text: str) -> None:
+        self._warning = ""
         self.model.search(text)
         self._say()
 
@@ -206,8 +211,9 @@ class RunBrowser(QWidget):
         if self._unread:
             parts.append(texts.RUNS_READING.format(n=len(self._unread)))
         text = " · ".join(parts) if every else texts.RUNS_NONE.format(folder=folder)
-        self.message.setText(self._problem or self._opening or text)
-        set_level(self.message, "alarm" if self._problem.startswith("▲") else "calm")
+        problem = self._problem or self._warning
+        self.message.setText(problem or self._opening or text)
+        set_level(self.message, "alarm" if problem.startswith("▲") else "calm")
         self._refresh()
 
     def _refresh(self) -> None:

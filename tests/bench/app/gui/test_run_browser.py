@@ -126,6 +126,11 @@ def test_files_that_are_no_runs_are_rows_with_the_reason(page: ResultsPage, fold
     settle(page)
     assert page.views.currentWidget() is browser
     assert browser.message.text().startswith("▲")
+    browser.look()  # as every few seconds
+    settle(page)
+    assert browser.message.text().startswith("▲")
+    browser.search.setText("cut")
+    assert not browser.message.text().startswith("▲")
 
 
 def test_every_word_of_the_search_is_found_anywhere(page: ResultsPage) -> None:
