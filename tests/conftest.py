@@ -4,7 +4,7 @@ import gc
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterable
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -30,18 +30,23 @@ os.environ.setdefault("ROCKBENCH_SESSIONS", "off")
 
 pytest.register_assert_rewrite("bench.testing.conformance")
 
-INSTRUMENTS = (
+WIRES = (
     "tests/drivers/daqmx/",
     "tests/drivers/emulation/",
-    "tests/drivers/hardware/",
     "tests/drivers/optoncdt/",
+)
+"""Tests of one instrument and its wire, paced by emulated instruments to milliseconds: one after the other, or they
+hold each other up."""
+
+RIGS = (
+    "tests/drivers/hardware/",
     "tests/drivers/test_hardware_rig.py",
     "tests/faults/emulated/",
     "tests/bench/app/cli/test_devices.py",
     "tests/bench/app/cli/test_emulate.py",
     "tests/protocols/check/",
 )
-"""Tests that emulated instruments pace, to milliseconds: one after the other, or they hold each other up."""
+"""The same with all instruments of a rig; beside those of one wire, since both mostly wait."""
 
 PEOPLE = (
     "tests/bench/app/cli/test_interrupts.py",
@@ -51,8 +56,8 @@ PEOPLE = (
 )
 """Tests that a person's clock paces, to tenths of a second: one after the other, beside those of the instruments."""
 
-REAL_TIME = {"instruments": INSTRUMENTS, "people": PEOPLE}
-"""Groups that stay in one process each; both mostly wait."""
+REAL_TIME = {"rigs": RIGS, "people": PEOPLE, "wires": WIRES}
+"""Groups that stay in one process each and mostly wait, the longest first."""
 
 EXCUSES = pytest.StashKey[list[Lateness | Slowness]]()
 
@@ -88,14 +93,21 @@ def pytest_configure(config: pytest.Config) -> None:
     """The kernel, and in a new environment the bytecode, is compiled once, before several processes want it."""
     if hasattr(config, "workerinput") or not config.getoption("numprocesses", 0) or config.option.collectonly:
         return
-    compiling = [
-        subprocess.Popen([sys.executable, "-c", f"import {modules}"], cwd=config.rootpath) for modules in KERNELS
-    ]
-    for process in compiling:
-        process.wait()
+    _side_by_side(["-c", f"import {modules}"] for modules in KERNELS)
     if config.args_source is pytest.Config.ArgsSource.TESTPATHS and not WINDOW.exists():
-        collecting = [sys.executable, "-m", "pytest", "--collect-only", "-q", "-n", "0"]
-        subprocess.run(collecting, cwd=config.rootpath, stdout=subprocess.DEVNULL, check=False)
+        tests = Path(__file__).parent
+        others = [f"--ignore={tests / 'bench'}", str(tests)]
+        _side_by_side(["-m", "pytest", "--collect-only", "-q", "-n", "0", *half] for half in (["tests/bench"], others))
+
+
+def _side_by_side(programs: Iterable[list[str]]) -> None:
+    """Carry out Python programs, given by their arguments, at the same time."""
+    started = [
+        subprocess.Popen([sys.executable, *each], cwd=Path(__file__).parents[1], stdout=subprocess.DEVNULL)
+        for each in programs
+    ]
+    for process in started:
+        process.wait()
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
@@ -138,8 +150,8 @@ def pytest_collection_finish() -> None:
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:  # noqa: ARG001 - the hook's signature
-    """One process more than processors: those with the tests of REAL_TIME mostly wait."""
-    return (os.cpu_count() or 1) + 1
+    """Two processes more than processors: those with the tests of REAL_TIME mostly wait."""
+    return (os.cpu_count() or 1) + 2
 
 
 def _paced_by(nodeid: str) -> str | None:
