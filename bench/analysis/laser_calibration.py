@@ -71,7 +71,7 @@ class LaserCalibration(Parameters):
         ...,
         "m",
         "largest smooth error common to both corrected lasers, which is that of the reference sensor",
-        usual=(1e-6, 1e-3),
+        usual=(1e-8, 1e-3),
     )
     table_displacement: float = quantity(..., "1", "ratio of true to measured displacement of the table", gt=0)
     table_acceleration: float = quantity(..., "1", "ratio of true to measured acceleration of the table", gt=0)

@@ -9,15 +9,13 @@ storeys; passes at two frequencies separate c from a scale error. All three are 
 cycles of the passes, at equal steps of the phase; e is a sum of Chebyshev polynomials of the reading. The motion need
 not be a pure sine, since the laser and the table's sensor measure the same motion.
 
-The order is chosen by cross-validation: it is the one whose curves, fitted to all passes but one, predict the omitted
-pass best. Higher orders add little noise, so that the lowest order within one standard error of the best, a usual
-choice, would have larger errors. The uncertainty of the curve combines the scatter of the curves that omit each pass in
-turn (jackknife) and the contribution of higher orders, or of the highest one if this is chosen.
+The displacement is that of the table's sensor, corrected for its linearity error
+(`protocols.laser_calibration.reference`). `protocols.laser_calibration.polynomial` chooses the order of the polynomial.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import sqrt
+from math import hypot
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -25,6 +23,7 @@ from numpy.typing import NDArray
 
 from bench.analysis.cycles import Cycle, mean_waves
 from bench.analysis.signals import ACCELERATION, DISPLACEMENT, LASER_1, LASER_2
+from protocols.laser_calibration.polynomial import PLACES, fit_polynomial, scatter
 
 Array = NDArray[np.float64]
 
@@ -35,9 +34,6 @@ of it.
 
 HARMONICS = HIGHEST + 1
 """Number of harmonics fitted to the cycles: the order k of an error shows in the harmonics up to about k."""
-
-READINGS = 201
-"""Number of readings at which curves are compared."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,21 +46,33 @@ class Pass:
     displacement: Array
     speed: Array
     lasers: tuple[Array, Array]
-    ratio: float
-    """Ratio of the span of the table's displacement to that computed from its acceleration. Since the lasers are
-    compared with the displacement over almost the same span, the linearity error of its sensor largely cancels in the
-    scale of the accelerometer.
-    """
+    integrated: Array
+    """Displacement [m] computed from the acceleration, without its mean, shape (k,)."""
     harmonics: int = HARMONICS
     """Number of harmonics fitted to the cycles, fewer with a low sample rate."""
+
+    @property
+    def ratio(self) -> float:
+        """Ratio of the span of the table's displacement to that computed from its acceleration. Since the lasers are
+        compared with the displacement over almost the same span, the linearity error of its sensor largely cancels in
+        the scale of the accelerometer.
+        """
+        return float(np.ptp(self.displacement) / np.ptp(self.integrated))
+
+    @property
+    def highest(self) -> int:
+        """Highest order of a polynomial that the harmonics determine."""
+        return max(min(HIGHEST, self.harmonics - 1), 1)
 
 
 @dataclass(frozen=True, eq=False)
 class ErrorCurve:
     """Error curve of one laser relative to the measured table displacement: Chebyshev coefficients `error` [m] over the
-    readings from `low` to `high` [m], and `delay` [s]. `scores` [m], shape (orders,), are the rms prediction errors of
-    the orders from 1 on; `residual` [m] is the rms contribution of higher orders, or of the highest one if this is
-    chosen. `without` [m], shape (passes, READINGS), are the curves, and `delays` [s], shape (passes,), the delays,
+    readings from `low` to `high` [m], and `delay` [s].
+
+    `scores` [m], shape (orders,), are the rms prediction errors of the orders from 1 on. `beyond` [m] is the rms
+    contribution of higher orders, or of the highest one if this is chosen, and `residual` [m] that without their
+    scatter. `without` [m], shape (passes, READINGS), are the curves, and `delays` [s], shape (passes,), the delays,
     fitted without each pass in turn.
     """
 
@@ -73,6 +81,7 @@ class ErrorCurve:
     error: Array
     delay: float
     scores: Array
+    beyond: float
     residual: float
     without: Array
     delays: Array
@@ -80,9 +89,7 @@ class ErrorCurve:
     @property
     def uncertainty(self) -> float:
         """Standard uncertainty of the curve at one reading [m], excluding the mean error."""
-        bent = self.without - self.without.mean(axis=1)[:, None]
-        variance = float(np.mean([jackknife(place) ** 2 for place in bent.T]))
-        return sqrt(variance + self.residual**2)
+        return hypot(scatter(self.without), self.residual)
 
     @property
     def slope(self) -> float:
@@ -97,21 +104,15 @@ class ErrorCurve:
         return spans / (self.high - self.low)
 
 
-def jackknife(found: Array) -> float:
-    """Jackknife standard uncertainty of a value, from its estimates with one of the n passes omitted, shape (n,)."""
-    return sqrt((found.size - 1) / found.size * float(np.sum((found - found.mean()) ** 2)))
-
-
 def mean_pass(cycles: Sequence[Cycle], omega: float) -> Pass:
     """A pass at `omega` [rad/s], computed from its cycles, whose signals are relative to the values at rest."""
     waves = mean_waves(cycles)
-    displaced = _integrated_twice(waves.waveform[:, ACCELERATION], omega)
     return Pass(
         omega=omega,
         displacement=waves.waveform[:, DISPLACEMENT],
         speed=omega * waves.rates[:, DISPLACEMENT],
         lasers=(waves.waveform[:, LASER_1], waves.waveform[:, LASER_2]),
-        ratio=float(np.ptp(waves.waveform[:, DISPLACEMENT]) / np.ptp(displaced)),
+        integrated=_integrated_twice(waves.waveform[:, ACCELERATION], omega),
         harmonics=min(cycle.fitted for cycle in cycles),
     )
 
@@ -130,42 +131,18 @@ def fit_curve(passes: Sequence[Pass], laser: int, rest: float) -> ErrorCurve:
     readings = [rest + each.lasers[laser] for each in passes]
     # the range that all passes cover
     low, high = max(float(r.min()) for r in readings), min(float(r.max()) for r in readings)
-    highest = max(min(HIGHEST, min(each.harmonics for each in passes) - 1), 1)
-    rows = [_rows(r, each, low, high, highest) for r, each in zip(readings, passes, strict=True)]
-    every = range(len(passes))
-    # the triangular factor of each pass has the same solutions as its rows, which are ten times as many
-    factors = [np.linalg.qr(each, mode="r") for each in rows]
-
-    def columns(order: int) -> list[int]:
-        return [*range(order + 1), -3, -2]
-
-    def solved(order: int, out: int | None = None) -> Array:
-        reduced = np.concatenate([factors[k] for k in every if k != out])
-        found, *_ = np.linalg.lstsq(reduced[:, columns(order)], reduced[:, -1], rcond=None)
-        return found.astype(np.float64)
-
-    def missed(order: int, out: int) -> float:
-        wrong = rows[out][:, -1] - rows[out][:, columns(order)] @ solved(order, out)
-        # the variance excludes the mean, since quantisation shifts the zero differently in each pass
-        return float(np.var(wrong))
-
-    squares: Array = np.array([[missed(order, out) for out in every] for order in range(1, highest + 1)])
-    means = squares.mean(axis=1)
-    order = int(means.argmin()) + 1
-    whole, finest = solved(order), solved(highest)
-    # beyond the highest order nothing is known: its own contribution stands for what may be missing
-    coarser = whole if order < highest else solved(max(highest - 1, 1))
-    alone: Array = np.array([solved(order, out) for out in every])
-    at = np.linspace(-1.0, 1.0, READINGS)
+    highest = min(each.highest for each in passes)
+    fit = fit_polynomial([_rows(r, each, low, high, highest) for r, each in zip(readings, passes, strict=True)])
     return ErrorCurve(
         low=low,
         high=high,
-        error=whole[:-2],
-        delay=float(whole[-2]),
-        scores=np.sqrt(means),
-        residual=float(np.std(chebyshev.chebval(at, finest[:-2]) - chebyshev.chebval(at, coarser[:-2]))),
-        without=(chebyshev.chebvander(at, order) @ alone[:, :-2].T).T.astype(np.float64),
-        delays=alone[:, -2],
+        error=fit.whole[:-2],
+        delay=float(fit.whole[-2]),
+        scores=fit.scores,
+        beyond=fit.beyond,
+        residual=fit.residual,
+        without=(chebyshev.chebvander(PLACES, fit.order) @ fit.without[:, :-2].T).T.astype(np.float64),
+        delays=fit.without[:, -2],
     )
 
 

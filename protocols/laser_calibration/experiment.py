@@ -27,7 +27,9 @@ from drivers.rig import OperatorTask
 from protocols.common.calibrate import STOREYS_CLAMPED
 from protocols.laser_calibration.curves import ErrorCurve
 from protocols.laser_calibration.plan import START, expected_duration, measure, planned_passes
+from protocols.laser_calibration.polynomial import PLACES
 from protocols.laser_calibration.protocol import CalibratedSensor, LaserCalibrationParameters
+from protocols.laser_calibration.reference import ReferenceCurve
 from protocols.laser_calibration.scales import disagreements
 from sim.errors import InvalidInput, RockbenchError
 from sim.parameters import Parameters
@@ -66,6 +68,7 @@ class LaserCalibrationRun(Prepared[LaserCalibrationParameters]):
         super().__init__(parameters, configuration, stored)
         self._found: LaserCalibration | None = None
         self._curves: tuple[ErrorCurve, ErrorCurve] | None = None
+        self._reference: ReferenceCurve | None = None
         self._clamped = False
         p, limits = self.parameters, configuration.limits
         if configuration.laser_reference != "ground":
@@ -126,7 +129,7 @@ class LaserCalibrationRun(Prepared[LaserCalibrationParameters]):
         }
 
     def plan(self) -> Plan:
-        self._found = self._curves = None
+        self._found = self._curves = self._reference = None
         self._clamped = False
         return self.collected(self._steps())
 
@@ -138,23 +141,23 @@ class LaserCalibrationRun(Prepared[LaserCalibrationParameters]):
         yield OperatorAction(OperatorTask.LOCK_FRAME, bare, _CLAMP)
         self._clamped = True
         try:
-            found, curves = yield from measure(self.parameters, self.configuration)
+            found, curves, reference = yield from measure(self.parameters, self.configuration)
         except RockbenchError:
             yield OperatorAction(OperatorTask.UNLOCK_FRAME, bare, _UNCLAMP)
             self._clamped = False
             raise
-        for remark in disagreements(found, curves, self.configuration):
+        for remark in disagreements(found, curves, reference, self.configuration):
             yield Publish(Warned(remark))
-        self._found, self._curves = found, curves
+        self._found, self._curves, self._reference = found, curves, reference
         for number, (curve, laser) in enumerate(zip(curves, found.lasers, strict=True), 1):
             yield Publish(_fit_event(f"laser_{number}", curve, laser.delay, laser.delay_uncertainty))
-        for point in _calibrated_sensors(found):
+        for point in _calibrated_sensors(found, reference):
             yield Publish(PointFinished(point))
         yield OperatorAction(OperatorTask.UNLOCK_FRAME, bare, _UNCLAMP)
         self._clamped = False
 
     def result(self, points: Sequence[Parameters]) -> Result:
-        found, curves = self._found, self._curves
+        found, curves, reference = self._found, self._curves, self._reference
 
         def write(path: Path) -> None:
             if found is not None:
@@ -164,7 +167,7 @@ class LaserCalibrationRun(Prepared[LaserCalibrationParameters]):
         return Result(
             points=tuple(points),
             text=f"{text}\n{STOREYS_CLAMPED}" if self._clamped else text,
-            figures={"laser_errors.png": lambda path: write_figure(path, _errors_figure(curves))},
+            figures={"laser_errors.png": lambda path: write_figure(path, _errors_figure(curves, reference))},
             files={} if found is None else {"laser_calibration.json": write},
         )
 
@@ -188,7 +191,7 @@ def _fit_event(name: str, curve: ErrorCurve, delay: float, uncertainty: float) -
     )
 
 
-def _calibrated_sensors(found: LaserCalibration) -> Iterator[CalibratedSensor]:
+def _calibrated_sensors(found: LaserCalibration, reference: ReferenceCurve) -> Iterator[CalibratedSensor]:
     """Results of both lasers, of their ratio, and of both sensors of the table."""
     for name, laser in (("laser_1", found.laser_1), ("laser_2", found.laser_2)):
         at = np.linspace(laser.lowest, laser.highest, 201)
@@ -211,12 +214,21 @@ def _calibrated_sensors(found: LaserCalibration) -> Iterator[CalibratedSensor]:
         scale=found.differential_scale,
         scale_uncertainty=COVERAGE * found.differential_uncertainty,
     )
-    for name, factor in (
-        ("table_displacement", found.table_displacement),
-        ("table_acceleration", found.table_acceleration),
-    ):
-        uncertainty = COVERAGE * found.table_uncertainty / factor
-        yield CalibratedSensor(sensor=name, scale=1.0 / factor, scale_uncertainty=uncertainty)
+    displacement, acceleration = found.table_displacement, found.table_acceleration
+    uncertainty = COVERAGE * found.table_uncertainty
+    yield CalibratedSensor(
+        sensor="table_displacement",
+        scale=1.0 / displacement,
+        scale_uncertainty=uncertainty / displacement,
+        lowest_m=reference.low,
+        highest_m=reference.high,
+        order=reference.error.size - 1,
+        largest_error_m=reference.largest,
+        residual_m=COVERAGE * reference.uncertainty,
+    )
+    yield CalibratedSensor(
+        sensor="table_acceleration", scale=1.0 / acceleration, scale_uncertainty=uncertainty / acceleration
+    )
 
 
 def _sensors_table(points: Sequence[CalibratedSensor]) -> str:
@@ -226,28 +238,27 @@ def _sensors_table(points: Sequence[CalibratedSensor]) -> str:
     return text_table(_COLUMNS, map(_cells, points))
 
 
-def _errors_figure(curves: tuple[ErrorCurve, ErrorCurve] | None) -> "Figure":
-    """Figure with two panels for each laser, empty without curves."""
-    figure = new_figure(9.0, 6.5)
-    panels = figure.subplots(2, 2, width_ratios=(3, 1), squeeze=False)
-    for number, (over, orders) in enumerate(panels, 1):
-        over.set_title(f"laser {number}", loc="left", fontsize=10)
+def _errors_figure(curves: tuple[ErrorCurve, ErrorCurve] | None, reference: ReferenceCurve | None) -> "Figure":
+    """Figure with two panels for each laser and for the table's displacement sensor, empty without curves."""
+    figure = new_figure(9.0, 9.0)
+    panels = figure.subplots(3, 2, width_ratios=(3, 1), squeeze=False)
+    titles = "laser 1", "laser 2", "table displacement"
+    references = "displacement", "displacement", "acceleration integrated twice"
+    for (over, orders), title, compared in zip(panels, titles, references, strict=True):
+        over.set_title(title, loc="left", fontsize=10)
         over.set_xlabel("reading [mm]")
-        over.set_ylabel("reading minus displacement [µm]")
+        over.set_ylabel(f"reading minus {compared} [µm]", fontsize=8)
         orders.set_xlabel("order [1]")
         orders.set_ylabel("prediction error [µm]")
         set_grid(over)
         # orders are integers
         orders.xaxis.get_major_locator().set_params(integer=True)
         set_grid(orders)
-        if curves is None:
-            continue
-        curve = curves[number - 1]
-        at = np.linspace(-1.0, 1.0, curve.without.shape[1])
-        reading = 1e3 * np.linspace(curve.low, curve.high, at.size)
+    for (over, orders), curve in zip(panels, (*(curves or ()), *filter(None, [reference])), strict=False):
+        reading = 1e3 * np.linspace(curve.low, curve.high, PLACES.size)
         for each in curve.without:
             over.plot(reading, 1e6 * (each - each.mean()), color=GREY, linewidth=0.6)
-        error = np.polynomial.chebyshev.chebval(at, curve.error)
+        error = np.polynomial.chebyshev.chebval(PLACES, curve.error)
         over.plot(reading, 1e6 * (error - error.mean()), color=BLUE)
         tried = np.arange(1, curve.scores.size + 1)
         orders.semilogy(tried, 1e6 * curve.scores, "o-", color=BLACK, markersize=4)

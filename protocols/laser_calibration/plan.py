@@ -26,6 +26,7 @@ from bench.events import Progress, StepStarted
 from protocols.common.calibrate import SETTLING, Unmeasurable, calibrate_drive, complete_cycles, probed_drive
 from protocols.laser_calibration.curves import HARMONICS, ErrorCurve, Pass, fit_curve, mean_pass
 from protocols.laser_calibration.protocol import LaserCalibrationParameters
+from protocols.laser_calibration.reference import ReferenceCurve, fit_reference
 from protocols.laser_calibration.scales import calibration, require_agreement
 from sim.channel import STOREYS
 
@@ -75,8 +76,10 @@ def _measuring(parameters: LaserCalibrationParameters, after: int = 0) -> float:
 
 def measure(
     parameters: LaserCalibrationParameters, configuration: BenchConfiguration
-) -> Generator[Step, Outcome, tuple[LaserCalibration, tuple[ErrorCurve, ErrorCurve]]]:
-    """Steps of the measurement with the clamped frame; returns the calibration and the error curves of the lasers."""
+) -> Generator[Step, Outcome, tuple[LaserCalibration, tuple[ErrorCurve, ErrorCurve], ReferenceCurve]]:
+    """Steps of the measurement with the clamped frame; returns the calibration, the error curves of the lasers and that
+    of the table's displacement sensor.
+    """
     yield Publish(StepStarted("acquire the laser signals at rest"))
     at_rest = yield AcquireAtRest(REST)
     if not isinstance(at_rest, RestSamples):
@@ -89,6 +92,8 @@ def measure(
         yield RampOut(fast=True)
         raise
     yield RampOut()
+    reference = fit_reference(passes, parameters.reference_linearity)
+    passes = reference.corrected(passes)
     curves = fit_curve(passes, 0, rests[0]), fit_curve(passes, 1, rests[1])
     require_agreement(curves)
     devices = {channel.name: channel.device for channel in at_rest.channels}
@@ -99,11 +104,11 @@ def measure(
         (devices[STOREYS[0]], devices[STOREYS[1]]),
         configuration.analysis,
         configuration.laser_ranges,
-        reference_linearity=parameters.reference_linearity,
+        common_linearity=reference.remaining,
         valid_days=parameters.valid_days,
         date=datetime.now(UTC).replace(microsecond=0),
     )
-    return found, curves
+    return found, curves, reference
 
 
 def _passes(parameters: LaserCalibrationParameters) -> Generator[Step, Outcome, list[Pass]]:

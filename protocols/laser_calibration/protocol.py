@@ -47,7 +47,7 @@ class CalibratedSensor(Parameters):
     lowest_m: float | None = quantity(None, "m", "smallest covered reading")
     highest_m: float | None = quantity(None, "m", "largest covered reading")
     order: int | None = quantity(None, "1", "order of the error polynomial")
-    largest_error_m: float | None = quantity(None, "m", "largest error that is corrected, excluding its mean")
+    largest_error_m: float | None = quantity(None, "m", "largest error, excluding its mean; corrected for lasers")
     residual_m: float | None = quantity(None, "m", "expanded uncertainty of the error at one reading (k = 2)")
     delay_s: float | None = quantity(None, "s", "delay relative to the table's displacement")
     delay_uncertainty_s: float | None = quantity(None, "s", "expanded uncertainty of the delay (k = 2)")

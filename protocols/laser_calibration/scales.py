@@ -18,7 +18,9 @@ from bench.analysis.sensor_accuracy import SensorAccuracy
 from bench.analysis.uncertainty import COVERAGE
 from bench.config.model import BenchConfiguration
 from protocols.common.calibrate import Unmeasurable
-from protocols.laser_calibration.curves import READINGS, ErrorCurve, Pass, jackknife
+from protocols.laser_calibration.curves import ErrorCurve, Pass
+from protocols.laser_calibration.polynomial import PLACES, jackknife
+from protocols.laser_calibration.reference import ReferenceCurve
 from protocols.laser_calibration.standards import IMPLAUSIBLE, standards
 
 Array = NDArray[np.float64]
@@ -32,14 +34,14 @@ def calibration(
     accuracy: SensorAccuracy,
     ranges: tuple[float, float],
     *,
-    reference_linearity: float,
+    common_linearity: float,
     valid_days: float,
     date: datetime,
 ) -> LaserCalibration:
     """Calibration of all sensors.
 
-    `reference_linearity` is the linearity error of the displacement sensor, relative to the covered range; `accuracy`
-    and `ranges` [m] are taken from the lasers' data sheets.
+    `common_linearity` is the linearity error of the displacement sensor that is left in the passes [m]; `accuracy` and
+    `ranges` [m] are taken from the lasers' data sheets.
     """
     slopes = [curve.slope for curve in curves]
     by_lasers = 1.0 / (1.0 - 0.5 * sum(slopes))
@@ -67,8 +69,9 @@ def calibration(
     # two lasers that disagree by more than they should leave half of the excess to their mean; since one of them must
     # have a fault that nobody has found, the accelerometer does not reduce it
     excess = 0.5 * sqrt(max((slopes[1] - slopes[0]) ** 2 - (COVERAGE * standard.apart) ** 2, 0.0))
-    # an error due to higher orders at both ends, as large as at any reading
-    bent = sqrt(2.0) * np.hypot(curves[0].residual, curves[1].residual) / span
+    # an error due to higher orders at both ends, as large as at any reading; their scatter is included, since the
+    # jackknife explains less of it at the ends
+    bent = sqrt(2.0) * np.hypot(curves[0].beyond, curves[1].beyond) / span
     return LaserCalibration(
         date=date,
         valid_days=valid_days,
@@ -76,7 +79,7 @@ def calibration(
         laser_2=found[1],
         differential_scale=found[1].scale / found[0].scale,
         differential_uncertainty=float(np.hypot(jackknife(curves[1].slopes - curves[0].slopes), bent)),
-        common_linearity=reference_linearity * span,
+        common_linearity=common_linearity,
         table_displacement=factor,
         table_acceleration=factor * float(ratios.mean()),
         table_uncertainty=hypot(uncertainty, excess, scatter),
@@ -100,10 +103,13 @@ def require_agreement(curves: tuple[ErrorCurve, ErrorCurve]) -> None:
 
 
 def disagreements(
-    found: LaserCalibration, curves: tuple[ErrorCurve, ErrorCurve], configuration: BenchConfiguration
+    found: LaserCalibration,
+    curves: tuple[ErrorCurve, ErrorCurve],
+    reference: ReferenceCurve,
+    configuration: BenchConfiguration,
 ) -> list[str]:
     """Remarks on sensors whose scales differ by more than `IMPLAUSIBLE` times the uncertainty of their difference, and
-    on lasers with a linearity error that the data sheets do not allow.
+    on linearity errors that the data sheets do not allow.
     """
     standard = standards(curves, configuration.analysis, configuration.laser_ranges)
     lasers, remarks = curves[1].slope - curves[0].slope, list[str]()
@@ -121,15 +127,20 @@ def disagreements(
                 "configuration"
             )
     limits = [configuration.analysis.laser_linearity * whole for whole in configuration.laser_ranges]
-    places = np.linspace(-1.0, 1.0, READINGS)
     for number, (curve, limit) in enumerate(zip(curves, limits, strict=True), 1):
         # a curve within the limits differs from its straight line by less than twice the limit
-        bent = float(np.abs(chebyshev.chebval(places, [0.0, 0.0, *curve.error[2:]])).max())
+        bent = float(np.abs(chebyshev.chebval(PLACES, [0.0, 0.0, *curve.error[2:]])).max())
         if bent > (most := 2.0 * limit + found.common_linearity):
             remarks.append(
                 f"the linearity error of laser_{number} is {1e6 * bent:.0f} um, more than the data sheets allow "
                 f"({1e6 * most:.0f} um): check its range, its target and analysis.laser_linearity"
             )
+    if not reference.plausible:
+        remarks.append(
+            "the linearity error of the table's displacement sensor, compared with the accelerometer, is "
+            f"{1e6 * reference.largest:.0f} um, more than reference_linearity allows ({1e6 * reference.limit:.0f} um): "
+            "check the sensor, and whether the table tilts as it moves, which an accelerometer measures as well"
+        )
     return remarks
 
 

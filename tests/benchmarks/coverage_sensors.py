@@ -16,6 +16,7 @@ from bench.analysis.signals import SignalMap
 from protocols.laser_calibration.curves import HARMONICS, fit_curve, mean_pass
 from protocols.laser_calibration.plan import planned_passes
 from protocols.laser_calibration.protocol import LaserCalibrationParameters
+from protocols.laser_calibration.reference import fit_reference
 from protocols.laser_calibration.scales import calibration
 from sim.excitation import SampledRecord
 from sim.filter_unit import FilterUnit
@@ -175,6 +176,8 @@ class Sensors:
             signals = self.signals(Motion(x, v, a, zero, zero, zero, zero), None)
             cycles = cycles_of(signals, omega, HARMONICS)
             passes.append(mean_pass(cycles, omega))
+        reference = fit_reference(passes, asked.reference_linearity)
+        passes = reference.corrected(passes)
         rests = float(self.reading(0, np.zeros(1))[0]), float(self.reading(1, np.zeros(1))[0])
         return calibration(
             passes,
@@ -183,7 +186,7 @@ class Sensors:
             ("first", "second"),
             ACCURACY,
             RANGES,
-            reference_linearity=asked.reference_linearity,
+            common_linearity=reference.remaining,
             valid_days=asked.valid_days,
             date=datetime.now(UTC),
         )

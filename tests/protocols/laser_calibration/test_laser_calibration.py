@@ -27,6 +27,7 @@ from drivers.rig import Channel, OperatorTask
 from protocols.common.calibrate import Unmeasurable
 from protocols.laser_calibration.curves import HARMONICS, ErrorCurve, Pass, fit_curve, mean_pass
 from protocols.laser_calibration.protocol import LaserCalibrationParameters
+from protocols.laser_calibration.reference import fit_reference
 from protocols.laser_calibration.scales import calibration, disagreements, require_agreement
 from sim.channel import STOREYS
 from sim.errors import InvalidInput
@@ -55,9 +56,7 @@ def made_pass(omega: float, amplitude: float, random: np.random.Generator, noise
         shown = place + error(k, place) - DELAYS[k] * v
         zero = RESTS[k] + float(error(k, np.array(RESTS[k])))
         lasers.append(shown - zero + noise * random.standard_normal(x.size))
-    return Pass(
-        omega, DISPLACEMENT_SHOWS * x, DISPLACEMENT_SHOWS * v, (lasers[0], lasers[1]), DISPLACEMENT_SHOWS / 1.001
-    )
+    return Pass(omega, DISPLACEMENT_SHOWS * x, DISPLACEMENT_SHOWS * v, (lasers[0], lasers[1]), 1.001 * x)
 
 
 def found(noise: float = 0.0) -> LaserCalibration:
@@ -71,7 +70,7 @@ def found(noise: float = 0.0) -> LaserCalibration:
         ("laser A", "laser B"),
         SensorAccuracy(),
         (RANGE, RANGE),
-        reference_linearity=5e-4,
+        common_linearity=5e-5,
         valid_days=30.0,
         date=datetime(2026, 5, 4, 12, tzinfo=UTC),
     )
@@ -100,10 +99,14 @@ def test_lasers_that_disagree_are_told_and_leave_their_difference_to_the_scale()
         passes, curves, rests = curves_of(scale)
         require_agreement(curves)
         one = calibration(
-            passes, curves, rests, ("A", "B"), SensorAccuracy(), (RANGE, RANGE), reference_linearity=5e-4,
+            passes, curves, rests, ("A", "B"), SensorAccuracy(), (RANGE, RANGE), common_linearity=5e-5,
             valid_days=30.0, date=datetime(2026, 5, 4, 12, tzinfo=UTC),
         )  # fmt: skip
-        remarks = [each for each in disagreements(one, curves, configuration) if "two lasers" in each]
+        remarks = [
+            each
+            for each in disagreements(one, curves, fit_reference(passes, 5e-4), configuration)
+            if "two lasers" in each
+        ]
         assert len(remarks) == count
         stated.append(one.table_uncertainty)
     # one per cent of error of the mean, with k = 2
@@ -116,16 +119,16 @@ def test_an_error_beyond_the_data_sheet_and_a_wrong_sensitivity_are_told() -> No
 
     def told(curves: tuple[ErrorCurve, ErrorCurve], passes: list[Pass]) -> list[str]:
         one = calibration(
-            passes, curves, rests, ("A", "B"), SensorAccuracy(), (RANGE, RANGE), reference_linearity=5e-4,
+            passes, curves, rests, ("A", "B"), SensorAccuracy(), (RANGE, RANGE), common_linearity=5e-5,
             valid_days=30.0, date=datetime(2026, 5, 4, 12, tzinfo=UTC),
         )  # fmt: skip
-        return disagreements(one, curves, BenchConfiguration())
+        return disagreements(one, curves, fit_reference(passes, 5e-4), BenchConfiguration())
 
     assert told(curves, passes) == []
     bent = replace(curves[1], error=curves[1].error + np.array([0.0, 0.0, 5e-4, *np.zeros(curves[1].error.size - 3)]))
     (remark,) = told((curves[0], bent), passes)
     assert "linearity error of laser_2" in remark
-    (remark,) = told(curves, [replace(each, ratio=1.03 * each.ratio) for each in passes])
+    (remark,) = told(curves, [replace(each, integrated=each.integrated / 1.03) for each in passes])
     assert "table's acceleration differs by +2.86 %" in remark
 
 
@@ -213,7 +216,7 @@ def test_few_harmonics_leave_short_waves_to_the_uncertainty() -> None:
             spectrum = np.fft.rfft(x + short(x))
             spectrum[harmonics + 1 :] = 0.0
             shown = np.fft.irfft(spectrum, x.size)
-            found.append(Pass(omega, x, omega * amplitude * np.cos(PHASES), (shown, shown), 1.0, harmonics))
+            found.append(Pass(omega, x, omega * amplitude * np.cos(PHASES), (shown, shown), x, harmonics))
         return found
 
     for harmonics, largest in ((10, 1e-4), (HARMONICS, 2e-6)):
