@@ -7,7 +7,7 @@ import sys
 import time
 from pathlib import Path
 
-from bench.app.ipc.messages import BEAT, Published
+from bench.app.ipc.messages import BEAT, Ended, Published, Refused
 from bench.events import StateChanged
 from tests.bench.app.ipc.experiment import begun
 
@@ -21,6 +21,9 @@ def main(out: Path, *, keep_going: bool, cycles: int) -> None:
         for message in link.take():
             if isinstance(message, Published) and isinstance(message.event, StateChanged):
                 print(message.event.after, flush=True)
+            elif isinstance(message, Ended | Refused):
+                # shown with the failure of a test that did not expect the end
+                print(message, file=sys.stderr, flush=True)
         time.sleep(BEAT / 2)
 
 
