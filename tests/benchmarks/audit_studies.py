@@ -180,7 +180,7 @@ def studies() -> dict[str, Study]:
                 calibrated_lasers.NAMES,
                 partial(calibrated_lasers.calibrated, case=case),
                 1.3,
-                {"curve": ("µm", 1e6)},
+                {"curve": ("µm", 1e6), "reference": ("µm", 1e6)},
             )
             for case in ("default", "smooth", "short waves")
         ),

@@ -31,6 +31,7 @@ from bench.config.model import BenchConfiguration
 from protocols.common.sine.settling import INTERVAL, JUDGED, LASERS, SHORTEST, TRANSIENT, Settled, checked
 from protocols.harmonic.judgement import Conditions, judge
 from protocols.harmonic.protocol import HarmonicParameters, HarmonicPoint, PointStatus
+from protocols.laser_calibration.reference import ReferenceCurve
 from sim.gain import predict_gain
 from sim.linear import steady_response
 from sim.rocking import State
@@ -102,7 +103,7 @@ def bench(seed: int, case: Case, omega: float, beta: float, *, campaign: bool = 
     branch = predict_gain(specimen, true, LEVEL).rocking
     if branch is None or not branch.stable:
         return Omitted("not stable")
-    found = calibration_of(seed, case) if case.calibrated else None
+    found = calibrated(seed, case)[0] if case.calibrated else None
     phase, *start = (float(value) for value in branch.orbit.section)
     moved = np.array([*start[:4], 0.0, start[4]])
     if "transient" not in case.off:
@@ -140,7 +141,7 @@ def _bare_start(specimen: Specimen, omega: float, case: Case, random: np.random.
 
 
 @lru_cache(maxsize=256)
-def calibration_of(seed: int, case: Case) -> LaserCalibration:
+def calibrated(seed: int, case: Case) -> tuple[LaserCalibration, ReferenceCurve]:
     """What a calibration finds of the sensors of a bench: the same at all of its points."""
     sensors = Sensors(seed, case)
     # another noise than that of the tests

@@ -16,7 +16,7 @@ from bench.analysis.signals import SignalMap
 from protocols.laser_calibration.curves import HARMONICS, fit_curve, mean_pass
 from protocols.laser_calibration.plan import planned_passes
 from protocols.laser_calibration.protocol import LaserCalibrationParameters
-from protocols.laser_calibration.reference import fit_reference
+from protocols.laser_calibration.reference import ReferenceCurve, fit_reference
 from protocols.laser_calibration.scales import calibration
 from sim.excitation import SampledRecord
 from sim.filter_unit import FilterUnit
@@ -165,7 +165,12 @@ class Sensors:
         signals.tare(values[LEAD:REST])
         return signals.of(values)
 
-    def calibrated(self) -> LaserCalibration:
+    def true_reference_error(self, readings: Array) -> Array:
+        """Linearity error of the table's displacement sensor [m] at `readings` [m]."""
+        # the error changes by less than a hundredth over its own size
+        return self._reference_error((readings - self._reference_error(readings)) / self.table)
+
+    def calibrated(self) -> tuple[LaserCalibration, ReferenceCurve]:
         """What a calibration finds of these sensors."""
         asked = LaserCalibrationParameters()
         passes = []
@@ -179,7 +184,7 @@ class Sensors:
         reference = fit_reference(passes, asked.reference_linearity)
         passes = reference.corrected(passes)
         rests = float(self.reading(0, np.zeros(1))[0]), float(self.reading(1, np.zeros(1))[0])
-        return calibration(
+        found = calibration(
             passes,
             (fit_curve(passes, 0, rests[0]), fit_curve(passes, 1, rests[1])),
             rests,
@@ -190,6 +195,7 @@ class Sensors:
             valid_days=asked.valid_days,
             date=datetime.now(UTC),
         )
+        return found, reference
 
     def reading(self, number: int, displacement: Array) -> Array:
         """Readings of laser 0 or 1 at `displacement` [m] from rest, relative to mid range, without noise and steps."""
