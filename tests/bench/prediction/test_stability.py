@@ -25,7 +25,7 @@ from sim.specimen import Specimen
 from sim.steady import rocking_orbit
 from sim.table_orbit import table_orbit
 
-ASKED = StabilityRequest(omega=(13.2, 12.2, 12.7), beta=(0.64,), harmonics=2)
+ASKED = StabilityRequest(omega=(13.2, 12.2, 12.7), beta=(0.64,), harmonics=1)
 AMPLITUDE = ASKED.amplitude_factor[0] * Specimen().uplift_acceleration
 KNOWN = SpecimenKnowledge()
 WEAK = Shaker(voltage_limit=0.5)
