@@ -159,9 +159,7 @@ def test_noise_counts_when_it_matters(loud_first: bool, let_go: Decay, monkeypat
     assert alike < 0.8 if loud_first else alike > 1.6, alike
 
 
-def test_the_wander_of_a_clock_is_not_counted_as_noise_as_well(
-    let_go: Decay, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_wander_of_a_clock_is_not_counted_as_noise_as_well(let_go: Decay, monkeypatch: pytest.MonkeyPatch) -> None:
     stretch, fit, random = let_go.fit.stretch, let_go.fit, np.random.default_rng(9)
     speed = np.gradient(fit.fitted, stretch.step, axis=1)
     # the delay of each laser wanders through one measuring period within 2.5 s

@@ -37,7 +37,8 @@ def compared(connection: Connection, **changes: dict[str, Any]) -> tuple[CommonM
         with HardwareRig(Hardware.model_validate(dict(hardware) | made), lead=LEAD) as rig:
             rig.perform(OperatorTask.LOCK_FRAME)
             time = np.arange(SETTLED + MEASURED) / rig.sample_rate
-            volts = 0.25 * np.minimum(2.0 * time, 1.0) * np.sin(np.outer(time, OMEGA) + np.arange(OMEGA.size)).sum(axis=1)
+            rising = 0.25 * np.minimum(2.0 * time, 1.0)
+            volts = rising * np.sin(np.outer(time, OMEGA) + np.arange(OMEGA.size)).sum(axis=1)
             blocks = play(started(rig), volts, BLOCK)
             names = [channel.name for channel in rig.channels]
             counts = np.concatenate([block.counts for block in blocks])[SETTLED:]
