@@ -31,8 +31,8 @@ LONG_LEAD = 2000
 """A lead that a loaded machine does not use up."""
 HARDLY = 0.15
 """How long the lasers are listened to [s] where it is no matter how well their clocks are known: a bench has 1 s."""
-WELL = 2.0
-"""The same where the clocks are judged: their rates are then known to some 10 ppm."""
+WELL = 1.0
+"""The same where the clocks are judged: their rates are then known far better than is asked."""
 OUTPUT = "Dev1/ao0"
 SERIAL = pytest.mark.skipif(sys.platform == "win32", reason="emulated serial lasers need pseudo-terminals")
 
