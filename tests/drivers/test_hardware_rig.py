@@ -343,7 +343,7 @@ class TestADeadClient:
         ("changes", "error"),
         [
             ({"sample_rate": 1999.0}, InvalidInput),
-            ({"emulator_address": "nowhere"}, InvalidInput),
+            pytest.param({"emulator_address": "nowhere"}, InvalidInput, marks=pytest.mark.soak),
             ({"daq": {"output": "Dev1/ao9"}}, InvalidInput),
             ({"laser_1": {"range": 5.0}}, InvalidInput),
             ({"lasers": {"connection": "serial"}, "laser_1": {"port": "/dev/not-there"}}, DeviceNotFound),
