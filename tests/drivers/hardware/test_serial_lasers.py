@@ -40,7 +40,7 @@ def emulated() -> Iterator[tuple[EmulatedLaser, EmulatedLaser]]:
         one.close()
 
 
-def observed(emulated: tuple[EmulatedLaser, EmulatedLaser], delay: float = 0.0) -> list[Track]:
+def observed(emulated: tuple[EmulatedLaser, EmulatedLaser], delay: float = 0.0) -> tuple[Track, ...]:
     """The lasers, whose clocks are observed for as short a time as a configuration can say."""
     first, second = (one.port for one in emulated)
     hardware = Hardware(
