@@ -31,6 +31,8 @@ LONG_LEAD = 2000
 """A lead that a loaded machine does not use up."""
 HARDLY = 0.15
 """How long the lasers are listened to [s] where it is no matter how well their clocks are known: a bench has 1 s."""
+WELL = 1.0
+"""The same where the clocks are judged: their rates are then known far better than is asked."""
 OUTPUT = "Dev1/ao0"
 SERIAL = pytest.mark.skipif(sys.platform == "win32", reason="emulated serial lasers need pseudo-terminals")
 
@@ -39,9 +41,9 @@ def laboratory(connection: Connection, device: Device = "usb") -> Laboratory:
     return Laboratory(VirtualBenchParameters(), Specimen(), seed=1, connection=connection, device=device)
 
 
-def quickly(emulated: Laboratory) -> Hardware:
-    """The configuration of a client that hardly listens to the lasers."""
-    lasers = emulated.hardware.lasers.model_copy(update={"observation_time": HARDLY})
+def quickly(emulated: Laboratory, listening: float = HARDLY) -> Hardware:
+    """The configuration of a client that listens to the lasers for a shorter time than a bench."""
+    lasers = emulated.hardware.lasers.model_copy(update={"observation_time": listening})
     return emulated.hardware.model_copy(update={"lasers": lasers})
 
 
@@ -100,7 +102,7 @@ class TestSerial:
     @pytest.fixture(scope="class")
     @classmethod
     def rig(cls, serial: Laboratory) -> Iterator[HardwareRig]:
-        with HardwareRig(serial.hardware, lead=LONG_LEAD) as rig:
+        with HardwareRig(quickly(serial, WELL), lead=LONG_LEAD) as rig:
             yield rig
 
     @pytest.fixture
@@ -341,7 +343,7 @@ class TestADeadClient:
         ("changes", "error"),
         [
             ({"sample_rate": 1999.0}, InvalidInput),
-            ({"emulator_address": "nowhere"}, InvalidInput),
+            pytest.param({"emulator_address": "nowhere"}, InvalidInput, marks=pytest.mark.soak),
             ({"daq": {"output": "Dev1/ao9"}}, InvalidInput),
             ({"laser_1": {"range": 5.0}}, InvalidInput),
             ({"lasers": {"connection": "serial"}, "laser_1": {"port": "/dev/not-there"}}, DeviceNotFound),

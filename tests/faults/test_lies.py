@@ -105,7 +105,7 @@ def test_a_lie_ends_the_run_with_the_backend_named(lie: Lie) -> None:
 
 
 @pytest.mark.usefixtures("plugged")
-@pytest.mark.parametrize("lie", _sessions(every=10))
+@pytest.mark.parametrize("lie", _sessions(every=20))
 def test_a_lie_ends_a_session_with_the_backend_named_and_the_file_whole(
     lie: Lie, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

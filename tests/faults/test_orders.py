@@ -136,7 +136,7 @@ def _settings(examples: int) -> settings:
 
 
 TestOrders = Orders.TestCase
-TestOrders.settings = _settings(100)
+TestOrders.settings = _settings(60)
 
 
 @pytest.mark.soak

@@ -207,7 +207,7 @@ HELD = [
 ]
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=8, deadline=None)
 @given(st.sampled_from(HELD), st.lists(st.integers(1, 900), min_size=5, max_size=12), st.integers(1, 3))
 def test_counts_do_not_depend_on_how_a_release_is_cut(held: Arrangement, blocks: list[int], seed: int) -> None:
     """From 3 s, the earliest, to 5 s, the latest, in blocks and as a whole."""

@@ -37,7 +37,7 @@ SIGNED = st.floats(-1.0, 1.0)
 SMALL_OR_LARGE = st.floats(-6.0, 3.0).map(lambda power: 10.0**power)
 
 
-@settings(max_examples=250, deadline=None)
+@settings(max_examples=120, deadline=None)
 @given(
     st.lists(SIGNED, min_size=2, max_size=12),
     st.floats(-4.0, -1.0).map(lambda power: 10.0**power),
@@ -67,7 +67,7 @@ def test_records_of_any_shape(
     assert motion.status in Status
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=80, deadline=None)
 @given(
     st.lists(
         st.tuples(st.floats(1e-3, 0.5), st.tuples(SIGNED, SIGNED), st.floats(0.1, 300.0), st.floats(0.1, 300.0)),

@@ -23,7 +23,7 @@ ends = st.sampled_from(ENDS)
 samples = st.lists(
     st.floats(-0.99, 0.99).filter(lambda value: abs(value) > 1e-8 or value == 0.0), min_size=2, max_size=43
 ).filter(lambda values: max(map(abs, values)) > 0.01)
-quick = settings(max_examples=60, deadline=None)
+quick = settings(max_examples=40, deadline=None)
 
 
 @pytest.fixture(scope="module")

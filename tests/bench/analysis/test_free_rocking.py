@@ -143,11 +143,11 @@ def test_a_trend_is_found_where_there_is_one(trend: float) -> None:
 
 
 def test_stated_uncertainties_are_those_of_repetition() -> None:
-    """Noise and the steps of a laser's output, filtered together: errors of 24 recordings against what each says."""
+    """Noise and the steps of a laser's output, filtered together: errors of 14 recordings against what each says."""
     true = motion(0.5)
     card = signal.butter(4, 100.0, fs=RATE, output="sos")
     errors, stated = [], []
-    for seed in range(24):
+    for seed in range(14):
         start = replace(true, start=2.5 + 0.01 * seed)
         seen = recording(start, Shown(noise=5e-6, step=4.9e-5), seed)
         started = signal.sosfilt_zi(card) * seen.displacement[0]
@@ -158,7 +158,7 @@ def test_stated_uncertainties_are_those_of_repetition() -> None:
         errors.append([values[R] - true.restitution, values[P] - P_TRUE, relation.restitution - true.restitution])
         stated.append([spread[R], spread[P], relation.uncertainty])
     ratio = np.sqrt(np.mean(np.square(errors), axis=0) / np.mean(np.square(stated), axis=0))
-    # of 24, the ratio scatters by 15 %
+    # of 14, the ratio scatters by 20 %
     assert np.all((ratio > 0.6) & (ratio < 1.45)), ratio
 
 
@@ -172,7 +172,7 @@ def test_errors_of_the_laser_are_carried_as_large_as_they_are() -> None:
         np.linalg.norm(laser.of_relation(plain.relation, plain.fit)),
     ]
     random, shifts = np.random.default_rng(3), []
-    for _ in range(16):
+    for _ in range(10):
         turned = 2 * np.pi * (random.uniform(0.5, 3.0) * seen.displacement / 0.2 + random.uniform())
         bent = replace(seen, displacement=seen.displacement + 0.0008 * 0.2 * np.sin(turned))
         found = analyse_tilt(bent, SPECIMEN, LEAST)
@@ -186,7 +186,7 @@ def test_a_delay_that_falls_back_moves_r_as_stated() -> None:
     plain = tilt(true, Shown(noise=1e-8))
     stated = laser.timing(plain.fit)[R]
     random, shifts = np.random.default_rng(5), []
-    for _ in range(16):
+    for _ in range(10):
         rate, phase = random.uniform(-0.2, 0.2), random.uniform()
         times = plain.recording.times
         late = np.interp(times - 2.5e-4 * ((rate * times + phase) % 1.0), times, plain.recording.displacement)

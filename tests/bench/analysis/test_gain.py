@@ -88,7 +88,7 @@ def test_the_peak_of_the_mean_cycle_has_no_bias_of_the_largest_sample(ratio: int
     fine = np.linspace(0.0, 2.0 * np.pi, 200_001)
     true = float(np.abs(np.sin(fine) + 0.05 * np.sin(3.0 * fine + 0.4)).max())
     found, largest = [], []
-    for _ in range(60):
+    for _ in range(30):
         noisy = np.zeros((24, phase.size, 7))
         noisy[:, :, DRIFT] = pure + (random.standard_normal((24, phase.size)) + random.choice([-1.0, 1.0])) / ratio
         cycles = [cycle for k, each in enumerate(noisy) if (cycle := fit_cycle(k, phase, each)) is not None]
@@ -107,14 +107,14 @@ def test_the_scatter_of_independent_cycles_is_the_standard_error() -> None:
 def test_correlated_cycles_count_less() -> None:
     draw = np.random.default_rng(2)
     covered = 0
-    for _ in range(300):
+    for _ in range(150):
         series = np.empty(60)
         series[0] = draw.standard_normal()
         for k in range(1, 60):
             series[k] = 0.7 * series[k - 1] + np.sqrt(1.0 - 0.49) * draw.standard_normal()
         peak = steady_peak(_cycles(10.0 + series), 1.0)
         covered += abs(peak.drift - 10.0) <= 2.0 * peak.scatter
-    assert covered / 300 > 0.85  # two standard errors of independent samples would cover about 60 %
+    assert covered / 150 > 0.85  # two standard errors of independent samples would cover about 60 %
 
 
 def test_an_unsteady_motion_counts_with_the_peaks_of_its_cycles() -> None:
@@ -155,7 +155,7 @@ def _rounded(amplitudes: Sequence[float], offset: float) -> list[Cycle]:
 
 def _errors(amplitudes: Sequence[float]) -> float:
     """Rms error of the peak [m] over offsets of the steps."""
-    peaks = [steady_peak(_rounded(amplitudes, offset), 1.0).drift for offset in (np.arange(50) + 0.5) / 50.0]
+    peaks = [steady_peak(_rounded(amplitudes, offset), 1.0).drift for offset in (np.arange(25) + 0.5) / 25.0]
     return float(np.sqrt(np.mean((np.array(peaks) - np.mean(amplitudes)) ** 2)))
 
 

@@ -37,7 +37,7 @@ def test_harmonic_steady_state(ratio: float) -> None:
     assert found[0] == pytest.approx(1 / np.hypot(1 - ratio**2, 2 * zeta * ratio), rel=2e-4)
 
 
-@pytest.mark.parametrize("dt", [0.002, 0.01, 0.02])
+@pytest.mark.parametrize("dt", [0.002, pytest.param(0.01, marks=pytest.mark.soak), 0.02])
 def test_any_record_against_integration(dt: float) -> None:
     record = np.convolve(np.random.default_rng(3).standard_normal(150), np.hanning(5), "same")
     periods, zeta = np.array([0.05, 0.2, 1.0]), 0.05

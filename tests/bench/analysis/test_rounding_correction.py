@@ -60,7 +60,11 @@ def estimated(cycles: list[Cycle], phase: float, step: float = STEP) -> Rounding
 # 50 um is the resolution of the data sheet, 2 % larger than a step
 @pytest.mark.parametrize(
     ("swing", "cutoff", "step", "share"),
-    [(24.0, 100.0, STEP, 0.4), (60.0, 100.0, 5e-5, 0.45), (200.0, 300.0, 5e-5, 0.6)],
+    [
+        (24.0, 100.0, STEP, 0.4),
+        pytest.param(60.0, 100.0, 5e-5, 0.45, marks=pytest.mark.soak),
+        (200.0, 300.0, 5e-5, 0.6),
+    ],
 )
 def test_most_of_the_error_is_found_and_the_rest_is_stated(
     swing: float, cutoff: float, step: float, share: float

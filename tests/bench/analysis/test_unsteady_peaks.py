@@ -28,7 +28,7 @@ def noisy(noise: float, seed: int) -> Cycle:
     return cycle
 
 
-@pytest.mark.parametrize("noise", [2e-5, 1e-4])
+@pytest.mark.parametrize("noise", [pytest.param(2e-5, marks=pytest.mark.soak), 1e-4])
 def test_the_noise_of_a_peak_is_stated(noise: float) -> None:
     peaks = [unsteady_peaks([noisy(noise, seed)], 15.0).greatest for seed in range(400)]
     errors = np.array([peak.drift - PEAK for peak in peaks])

@@ -57,9 +57,9 @@ def bare() -> TableModel:
 @pytest.mark.parametrize(
     ("specimen", "peak", "band"),
     [
-        (Specimen(), 1.47, (1.0, 12.0)),
+        pytest.param(Specimen(), 1.47, (1.0, 12.0), marks=pytest.mark.soak),
         (Specimen(), 1.47, (1.0, 25.0)),
-        (Specimen(beta=0.25), 1.0, (1.0, 12.0)),
+        pytest.param(Specimen(beta=0.25), 1.0, (1.0, 12.0), marks=pytest.mark.soak),
         (Specimen(beta=0.97), 1.0, (1.0, 12.0)),
     ],
 )
@@ -80,8 +80,14 @@ def test_half_a_percent_within_five_passes(specimen: Specimen, peak: float, band
 
 @pytest.mark.parametrize(
     ("gain", "stretch", "turn"),
-    [(1.3, 1.0, 0.0), (0.7, 1.0, 0.0), (1.0, 1.3, 0.0), (1.0, 0.7, 0.0), (1.0, 1.0, 30.0), (1.0, 1.0, -30.0)],
-    ids=["gain +30 %", "gain -30 %", "frequency +30 %", "frequency -30 %", "phase +30 deg", "phase -30 deg"],
+    [
+        pytest.param(1.3, 1.0, 0.0, id="gain +30 %"),
+        pytest.param(0.7, 1.0, 0.0, id="gain -30 %", marks=pytest.mark.soak),
+        pytest.param(1.0, 1.3, 0.0, id="frequency +30 %", marks=pytest.mark.soak),
+        pytest.param(1.0, 0.7, 0.0, id="frequency -30 %"),
+        pytest.param(1.0, 1.0, 30.0, id="phase +30 deg"),
+        pytest.param(1.0, 1.0, -30.0, id="phase -30 deg", marks=pytest.mark.soak),
+    ],
 )
 def test_a_wrong_model_is_put_right(bare: TableModel, gain: float, stretch: float, turn: float) -> None:
     elsewhere = np.clip(stretch * np.array(bare.frequency), *bare.band)

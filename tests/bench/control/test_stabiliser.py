@@ -26,7 +26,7 @@ def drawn(beta: float, seed: int) -> Specimen:
 
 
 @pytest.mark.parametrize("point", [(15.0, 0.97), (12.5, 0.64), (14.0, 0.97)])
-@pytest.mark.parametrize("seed", [6, 8])
+@pytest.mark.parametrize("seed", [6, pytest.param(8, marks=pytest.mark.soak)])
 def test_a_specimen_off_by_four_per_cent_is_captured_from_its_free_motion_and_held(
     windows: dict[tuple[float, float], CycleMap], point: tuple[float, float], seed: int
 ) -> None:

@@ -210,8 +210,8 @@ def test_what_fits_already_is_left_alone() -> None:
 
 
 def test_a_record_of_five_minutes_fits() -> None:
-    a = np.concatenate([ground_motion(seed, 38.0) * scale for seed, scale in enumerate((1.0, *(0.3,) * 7))])
-    record, reach = SampledRecord(a, 0.005), Reach(0.12, 0.6)
+    a = np.concatenate([ground_motion(seed, 38.0, 0.01) * scale for seed, scale in enumerate((1.0, *(0.3,) * 7))])
+    record, reach = SampledRecord(a, 0.01), Reach(0.12, 0.6)
     assert record.duration > 300.0
     good, simple = (fit_stroke(record, reach, method) for method in Method)
     _within(good, reach)

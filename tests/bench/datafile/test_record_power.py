@@ -74,7 +74,7 @@ def hold(folder: Path, states: list[bytes], seed: int, expected: NDArray[np.int1
 
 @pytest.mark.skipif(os.name != "posix", reason="tells files apart by their inode")
 @pytest.mark.parametrize(
-    "seeds", [range(3), *(pytest.param(range(k, k + 24), marks=pytest.mark.soak) for k in range(3, 195, 24))]
+    "seeds", [range(2), *(pytest.param(range(k, k + 24), marks=pytest.mark.soak) for k in range(2, 194, 24))]
 )
 def test_what_the_disk_had_kept_survives(states: list[bytes], tmp_path: Path, seeds: range) -> None:
     expected = np.concatenate([block(100 * k, 100).block.counts for k in range(BLOCKS)])

@@ -129,7 +129,7 @@ def _decisions(bench: Bench, *, short: bool) -> list[tuple[list[Violation], list
     return found
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(benches())
 def test_decisions_are_those_of_the_comparison_of_every_sample(bench: Bench) -> None:
     assert _decisions(bench, short=True) == _decisions(bench, short=False)
@@ -142,7 +142,7 @@ def test_decisions_are_those_of_the_comparison_of_every_sample_on_many_benches(b
     assert _decisions(bench, short=True) == _decisions(bench, short=False)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(benches())
 def test_bounds_are_never_below_the_magnitudes(bench: Bench) -> None:
     conversion = Conversion(bench.channels)
@@ -181,7 +181,7 @@ def test_the_heating_of_blocks_passed_over_is_made_up_for_bit_for_bit() -> None:
             skipping.skip(values, skipping.bounds(values, extremes))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(benches())
 def test_all_channels_at_once_have_the_values_of_each(bench: Bench) -> None:
     conversion = Conversion(bench.channels)
@@ -211,7 +211,7 @@ def _refusal(volts: np.ndarray, command: float, limits: Limits) -> tuple[str, in
 _EDGES = (0.0, -0.0, 0.2, -0.2, 4.9, 5.0, -5.0, float(np.nextafter(5.0, 6.0)), np.nan, np.inf, -np.inf)
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(st.lists(st.lists(st.one_of(st.sampled_from(_EDGES), st.floats(-6.0, 6.0)), min_size=1, max_size=6), max_size=6))
 def test_a_command_is_refused_as_by_the_comparison_of_every_sample(blocks: list[list[float]]) -> None:
     limits = Limits(drive_voltage=5.0, drive_slew=200.0)

@@ -14,13 +14,13 @@ from sim import map_rows
 from sim.errors import InvalidInput
 from sim.map_rows import Continuation
 
-LINE = ["predict", "map", "--omega", "14:20:12", "--beta", "0.2:0.9:23", "--band"]
-ROWS = 8
+COLUMNS, ROWS = 4, 8
+LINE = ["predict", "map", "--omega", f"14:20:{COLUMNS}", "--beta", "0.2:0.9:23", "--band"]
 
 
 @pytest.fixture(autouse=True)
 def _small_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(map_rows, "POINTS", 12 * ROWS)
+    monkeypatch.setattr(map_rows, "POINTS", COLUMNS * ROWS)
 
 
 def files(folder: Path) -> set[str]:

@@ -10,7 +10,14 @@ from matplotlib.contour import ContourSet
 from bench.app.cli.main import main
 from bench.figures.stability_figure import boundary_figure
 from bench.prediction.requests import StabilityRequest
-from bench.prediction.stability import BOUNDARY, boundaries_table, points_table, stability_boundaries, stability_points
+from bench.prediction.stability import (
+    BOUNDARY,
+    StabilityPoint,
+    boundaries_table,
+    points_table,
+    stability_boundaries,
+    stability_points,
+)
 from sim.knowledge import SpecimenKnowledge
 from sim.multiplier_sensitivity import fixed_slopes
 from sim.shaker import Shaker
@@ -18,9 +25,16 @@ from sim.specimen import Specimen
 from sim.steady import rocking_orbit
 from sim.table_orbit import table_orbit
 
-ASKED = StabilityRequest(omega=(13.2, 12.2, 12.7), beta=(0.64,), harmonics=5)
+ASKED = StabilityRequest(omega=(13.2, 12.2, 12.7), beta=(0.64,), harmonics=1)
 AMPLITUDE = ASKED.amplitude_factor[0] * Specimen().uplift_acceleration
 KNOWN = SpecimenKnowledge()
+WEAK = Shaker(voltage_limit=0.5)
+"""It cannot move the table, of which nothing is computed then."""
+
+
+@pytest.fixture(scope="module")
+def beyond_the_shaker() -> list[StabilityPoint]:
+    return stability_points(Specimen(), WEAK, ASKED)
 
 
 def stable(omega: float, ground: str) -> bool:
@@ -40,7 +54,7 @@ def test_the_motion_is_stable_on_one_side_of_each_boundary() -> None:
 
 
 def test_a_lighter_table_moves_the_boundary(capsys: pytest.CaptureFixture[str]) -> None:
-    flags = ["--omega", "12.3", "12.7", "--beta", "0.64", "--json"]
+    flags = ["--omega", "12.3", "12.7", "--beta", "0.64", "--harmonics", "1", "--json"]
     found = list[float]()
     for mass in ("20", "50"):
         assert main(["predict", "stability", *flags, "--table-mass", mass]) == 0
@@ -70,20 +84,20 @@ def test_no_boundary_is_said_and_the_multipliers_are_still_there(
     np.testing.assert_array_less(rows["table_modulus"], 1.0)
 
 
-def test_where_the_shaker_cannot_move_the_table_only_fixed_ground_is_known() -> None:
-    orbits = stability_points(Specimen(), Shaker(voltage_limit=0.5), ASKED)
-    points = points_table(orbits)
+def test_where_the_shaker_cannot_move_the_table_only_fixed_ground_is_known(
+    beyond_the_shaker: list[StabilityPoint],
+) -> None:
+    points = points_table(beyond_the_shaker)
     assert np.isnan(points["table_modulus"].values).all()
     assert np.isfinite(points["modulus"].values).all()
-    found = stability_boundaries(Specimen(), Shaker(voltage_limit=0.5), KNOWN, ASKED, orbits)
+    found = stability_boundaries(Specimen(), WEAK, KNOWN, ASKED, beyond_the_shaker)
     assert {each.ground for each in found} == {"fixed ground"}
 
 
 def test_boundaries_state_their_sensitivities_and_the_uncertainty_from_the_specimen() -> None:
     request = ASKED.model_copy(update={"omega": (12.2, 12.7)})
-    exact = Shaker(voltage_limit=0.5)
-    orbits = stability_points(Specimen(), exact, request)
-    (found,) = stability_boundaries(Specimen(), exact, KNOWN, request, orbits)
+    orbits = stability_points(Specimen(), WEAK, request)
+    (found,) = stability_boundaries(Specimen(), WEAK, KNOWN, request, orbits)
     orbit = rocking_orbit(Specimen().coupled(0.64), found.omega, AMPLITUDE)
     slopes, half_widths = fixed_slopes(orbit), {"k1": 0.05, "k2": 0.05, "xi1": 0.3, "xi2": 0.3, "k_c": 0.1}
     half_widths["restitution_factor"] = 0.01
@@ -99,14 +113,14 @@ def test_boundaries_state_their_sensitivities_and_the_uncertainty_from_the_speci
     assert np.isnan(table["omega_by_table_mass_rad_s"].values[0])
 
 
-def test_sensitivities_of_every_point_are_columns_of_the_points() -> None:
+def test_sensitivities_of_every_point_are_columns_of_the_points(beyond_the_shaker: list[StabilityPoint]) -> None:
     request = ASKED.model_copy(update={"omega": (12.5, 12.6), "sensitivity": True, "harmonics": 1})
-    orbits = stability_points(Specimen(), Shaker(voltage_limit=0.5), request)
+    orbits = stability_points(Specimen(), WEAK, request)
     table = points_table(orbits)
     expected = [fixed_slopes(each.orbit).modulus["amplitude"] for each in orbits]
     assert table["modulus_by_amplitude"].values.tolist() == pytest.approx(expected, rel=1e-9)
     assert "table_modulus_by_amplitude" not in table
-    assert "modulus_by_amplitude" not in points_table(stability_points(Specimen(), Shaker(voltage_limit=0.5), ASKED))
+    assert "modulus_by_amplitude" not in points_table(beyond_the_shaker)
 
 
 def test_boundaries_over_stiffness_and_amplitude(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -249,8 +249,8 @@ def test_a_server_that_goes_away_is_noticed_in_time(
 def test_a_server_that_was_late_once_is_not_trusted_again(
     server: DaqServer, open_session: OpenSession, plant: Loopback
 ) -> None:
-    session = driving(open_session(timeout_margin=1.0))
-    server.stall(2.5)
+    session = driving(open_session(timeout_margin=0.6))
+    server.stall(1.5)
     with pytest.raises(DeviceTimeout) as caught:
         session.read(BLOCK)
     assert "open a new session" in str(caught.value)

@@ -109,13 +109,13 @@ def test_an_exception_of_the_caller_is_an_end_too(open_session: OpenSession, pla
 def test_the_relay_is_cut_while_another_thread_reads(session: DaqSession, plant: Loopback) -> None:
     started(session, np.full(round(RATE), 3.0))
     read: list[int] = []
-    reader = threading.Thread(target=lambda: read.append(len(session.read(round(1.5 * RATE)))))
+    reader = threading.Thread(target=lambda: read.append(len(session.read(round(0.8 * RATE)))))
     reader.start()
     assert session.cut() is True
     assert not plant.enabled
     assert not read
     reader.join(LONG)
-    assert read == [round(1.5 * RATE)]
+    assert read == [round(0.8 * RATE)]
 
 
 def test_a_stop_ends_a_read_of_another_thread(session: DaqSession, plant: Loopback) -> None:

@@ -108,31 +108,36 @@ def test_a_halt_from_another_thread_is_no_input_that_opened(laboratory: Laborato
     assert all(all(one.values()) for one in seen)
 
 
-def test_a_halt_while_the_lasers_are_observed_prevents_the_run() -> None:
-    with (
-        Laboratory(VirtualBenchParameters(), Specimen(), seed=1, connection="serial") as laboratory,
-        HardwareRig(laboratory.hardware, lead=LEAD) as rig,
-    ):
-        halt = threading.Timer(0.2, rig.halt)
-        halt.start()
-        with pytest.raises(RigError, match="enable line was cut"):
-            rig.arm()
-        halt.join()
-        assert not laboratory.bench.enabled
+@pytest.fixture
+def observing() -> Iterator[tuple[Laboratory, HardwareRig]]:
+    """A rig that observes its lasers for two seconds when it is armed: a bench takes ten."""
+    with Laboratory(VirtualBenchParameters(), Specimen(), seed=1, connection="serial") as laboratory:
+        lasers = laboratory.hardware.lasers.model_copy(update={"observation_time": 2.0})
+        with HardwareRig(laboratory.hardware.model_copy(update={"lasers": lasers}), lead=LEAD) as rig:
+            yield laboratory, rig
 
 
-def test_an_input_that_opens_while_the_lasers_are_observed_prevents_the_run() -> None:
-    with (
-        Laboratory(VirtualBenchParameters(), Specimen(), seed=1, connection="serial") as laboratory,
-        HardwareRig(laboratory.hardware, lead=LEAD) as rig,
-    ):
-        guard = Guard(rig, Limits(), Ramps())
-        opening = threading.Timer(0.2, laboratory.safety.break_wire, ("over_travel",))
-        opening.start()
-        with pytest.raises(SafetyInputOpen, match="cannot be prepared: over-travel open"):
-            guard.arm()
-        opening.join()
-        assert not laboratory.bench.enabled
+def test_a_halt_while_the_lasers_are_observed_prevents_the_run(observing: tuple[Laboratory, HardwareRig]) -> None:
+    laboratory, rig = observing
+    halt = threading.Timer(0.2, rig.halt)
+    halt.start()
+    with pytest.raises(RigError, match="enable line was cut"):
+        rig.arm()
+    halt.join()
+    assert not laboratory.bench.enabled
+
+
+def test_an_input_that_opens_while_the_lasers_are_observed_prevents_the_run(
+    observing: tuple[Laboratory, HardwareRig],
+) -> None:
+    laboratory, rig = observing
+    guard = Guard(rig, Limits(), Ramps())
+    opening = threading.Timer(0.2, laboratory.safety.break_wire, ("over_travel",))
+    opening.start()
+    with pytest.raises(SafetyInputOpen, match="cannot be prepared: over-travel open"):
+        guard.arm()
+    opening.join()
+    assert not laboratory.bench.enabled
 
 
 @pytest.mark.parametrize(

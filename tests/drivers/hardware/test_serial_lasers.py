@@ -22,6 +22,7 @@ from tests.patience import LONG, eventually
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="emulated serial lasers need pseudo-terminals")
 
 RATE = 2000.0
+OBSERVED = 1.0
 
 
 class Still:
@@ -39,16 +40,24 @@ def emulated() -> Iterator[tuple[EmulatedLaser, EmulatedLaser]]:
         one.close()
 
 
-@pytest.fixture
-def lasers(emulated: tuple[EmulatedLaser, EmulatedLaser]) -> Iterator[Tracks]:
+def observed(emulated: tuple[EmulatedLaser, EmulatedLaser], delay: float = 0.0) -> tuple[Track, ...]:
+    """The lasers, whose clocks are observed for as short a time as a configuration can say."""
     first, second = (one.port for one in emulated)
     hardware = Hardware(
-        lasers=Lasers(rate=4000.0, observation_time=1.5, delay=5e-3),
+        lasers=Lasers(rate=4000.0, observation_time=OBSERVED, delay=delay),
         laser_1=Laser1(port=first, baud=921_600),
         laser_2=Laser2(port=second, baud=921_600),
     )
-    made = Tracks(open_serial_lasers(hardware))
+    return open_serial_lasers(hardware)
+
+
+@pytest.fixture
+def lasers(emulated: tuple[EmulatedLaser, EmulatedLaser]) -> Iterator[Tracks]:
+    made = Tracks(observed(emulated, 5e-3))
     yield made
+    # a silent sensor that is switched off is waited for
+    for one in emulated:
+        one.silence(0.0)
     made.close()
 
 
@@ -159,16 +168,10 @@ class Inclinometer:
 
 
 def test_a_second_kind_of_sensor_is_one_more_track(emulated: tuple[EmulatedLaser, EmulatedLaser]) -> None:
-    first, second = (one.port for one in emulated)
-    hardware = Hardware(
-        lasers=Lasers(rate=4000.0, observation_time=1.5),
-        laser_1=Laser1(port=first, baud=921_600),
-        laser_2=Laser2(port=second, baud=921_600),
-    )
     sensor = Inclinometer()
     placing = SensorTrack("tilt", 100.0, 0.0, lambda code: code.astype(np.int16), 32_000, MARKS)
     channel = Channel("tilt", "angle", "rad", 1e-4, 0.0, (-32_000, 32_000), "an inclinometer")
-    tracks = Tracks([*open_serial_lasers(hardware), Track(sensor, channel, placing, 1.5)])
+    tracks = Tracks([*observed(emulated), Track(sensor, channel, placing, OBSERVED)])
     try:
         assert [each.name for each in tracks.channels] == ["laser_1", "laser_2", "tilt"]
         run = Run(tracks, 200)

@@ -22,7 +22,7 @@ from tests.patience import LONG
 
 PLACE = 0.030
 """Where the target stands, from mid range [m]."""
-FOUND = Settings(output="RS422", rate=2000.0, average=8, hold=100.0, echo=True, baud=460_800)
+FOUND = Settings(output="RS422", rate=2000.0, average=8, hold=100.0, echo=True, baud=1_000_000)
 """As somebody else has left it."""
 
 
@@ -89,7 +89,7 @@ def taken_until(laser: SerialLaser, enough: Callable[[Readings], bool]) -> Readi
 def test_a_sensor_is_found_as_it_is_and_read(emulated: EmulatedLaser) -> None:
     (found,) = find_lasers([emulated.port])
     assert found.problem is None
-    assert found.baud == 460_800
+    assert found.baud == 1_000_000
     assert emulated.settings == FOUND
     with SerialLaser("laser_1", emulated.port, baud=None, rate=1000.0, measuring_range=0.2) as laser:
         laser.start()

@@ -1,4 +1,4 @@
-"""kill -9 of `rockbench run` itself, with the emulated laboratory in a process of its own as an operator starts it."""
+"""kill -9 of `rockbench run` itself, beside the emulated laboratory, which lives on in this process."""
 
 import os
 import signal
@@ -16,8 +16,10 @@ from bench.config.template import as_toml
 from bench.datafile.reader import open_datafile
 from bench.results import FILE
 from drivers.emulation.control import ask
+from drivers.emulation.laboratory import Laboratory
 from drivers.hardware.rig import HardwareRig
-from tests.emulated import emulated
+from sim.specimen import Specimen
+from sim.virtual_bench import VirtualBenchParameters
 from tests.installed import example
 from tests.patience import LONG
 
@@ -34,8 +36,10 @@ LATE = 0.5
 @pytest.fixture(scope="module")
 def laboratory(tmp_path_factory: pytest.TempPathFactory) -> Iterator[BenchConfiguration]:
     site = tmp_path_factory.mktemp("plugins") / "site"
-    with example(site, "tone_sweep"), emulated("--lasers", "analogue", "--sample-rate", "1000") as configuration:
-        yield configuration
+    bench = VirtualBenchParameters(sample_rate=1000.0)
+    with example(site, "tone_sweep"), Laboratory(bench, Specimen(), seed=1, connection="analogue") as emulated:
+        given = BenchConfiguration(backend="hardware", hardware=emulated.hardware)
+        yield given.model_copy(update={"acquisition": given.acquisition.model_copy(update={"lead": 0.4})})
 
 
 def _until(truth: Callable[[], dict[str, Any]], what: Callable[[dict[str, Any]], bool], patience: float) -> float:

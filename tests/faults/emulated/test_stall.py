@@ -1,12 +1,12 @@
 """The whole program is stopped for a second while it records: no laser value is lost, and the cause is named."""
 
+import multiprocessing
 import os
 import re
 import signal
-import subprocess
-import sys
 import time
 from collections.abc import Iterator
+from multiprocessing.connection import Connection
 from pathlib import Path
 
 import numpy as np
@@ -14,71 +14,75 @@ import pytest
 
 from bench.config.model import BenchConfiguration
 from bench.datafile.reader import DataFile, open_datafile
-from tests.emulated import emulated
+from bench.datafile.recorder import Recorder
+from bench.engine.engine import configured_engine
+from bench.engine.interface import EventStream, Requests, Unattended
+from bench.engine.steps import AcquireAtRest, Plan
+from bench.events import Acquired, Event
+from bench.guard.limits import Limits
+from drivers.emulation.laboratory import Laboratory
+from drivers.hardware.rig import HardwareRig
+from sim.specimen import Specimen
+from sim.virtual_bench import VirtualBenchParameters
+from tests.faults.setup import NoPoint
 from tests.lateness import Lateness
 from tests.patience import LONG
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="needs pseudo-terminals, and signals that stop a process")
 
 STALL, ACQUIRED = 1.0, 3.0
-CLIENT = """
-import sys
-from pathlib import Path
-from bench.config.model import BenchConfiguration
-from bench.datafile.recorder import Recorder
-from bench.engine.engine import configured_engine
-from bench.engine.interface import EventStream, Requests, Unattended
-from bench.engine.steps import AcquireAtRest
-from bench.events import Acquired
-from drivers.hardware.rig import HardwareRig
-from tests.faults.setup import NoPoint
-
-given = BenchConfiguration.model_validate_json(sys.stdin.readline())
-
-def began(event):
-    if isinstance(event, Acquired) and event.block.first == 0:
-        print("began", flush=True)
-
-def plan():
-    yield AcquireAtRest(%s)
-
-with HardwareRig(given.hardware, lead=given.lead_samples) as rig:
-    recorder = Recorder(Path(sys.argv[1]), channels=rig.channels, sample_rate=rig.sample_rate,
-                        point_type=NoPoint, metadata={})
-    engine = configured_engine(rig, given, EventStream(rig.clock, [recorder, began]), Requests(), Unattended())
-    ending = engine.run(plan())
-    recorder.close(ending.status, ending.reason)
-"""
 
 
 @pytest.fixture(scope="module")
 def configuration() -> Iterator[BenchConfiguration]:
-    with emulated("--lasers", "serial") as given:
-        lasers = given.hardware.lasers.model_copy(update={"observation_time": 1.5})
-        daq = given.hardware.daq.model_copy(update={"watchdog": 3.0, "timeout_margin": 2.0})
-        hardware = given.hardware.model_copy(update={"lasers": lasers, "daq": daq})
-        yield given.model_copy(
-            update={"hardware": hardware, "limits": given.limits.model_copy(update={"late": 3.0, "sensor_loss": 3.0})}
+    with Laboratory(VirtualBenchParameters(), Specimen(), seed=1, connection="serial") as laboratory:
+        hardware = laboratory.hardware
+        lasers = hardware.lasers.model_copy(update={"observation_time": 1.5})
+        daq = hardware.daq.model_copy(update={"watchdog": 3.0, "timeout_margin": 2.0})
+        yield BenchConfiguration(
+            backend="hardware",
+            hardware=hardware.model_copy(update={"lasers": lasers, "daq": daq}),
+            limits=Limits(late=3.0, sensor_loss=3.0),
         )
+
+
+def _plan() -> Plan:
+    yield AcquireAtRest(ACQUIRED)
+
+
+def _record(tell: Connection, given: BenchConfiguration, path: Path) -> None:
+    """In the process that is stopped: a recording at rest; tells when it begins."""
+
+    def began(event: Event) -> None:
+        if isinstance(event, Acquired) and event.block.first == 0:
+            tell.send("began")
+
+    with HardwareRig(given.hardware, lead=given.lead_samples) as rig:
+        recorder = Recorder(path, channels=rig.channels, sample_rate=rig.sample_rate, point_type=NoPoint, metadata={})
+        stream = EventStream(rig.clock, [recorder, began])
+        ending = configured_engine(rig, given, stream, Requests(), Unattended()).run(_plan())
+        recorder.close(ending.status, ending.reason)
 
 
 def stalled(configuration: BenchConfiguration, lead: float, path: Path) -> None:
     """Record, and stop the process for a second in between."""
     acquisition = configuration.acquisition.model_copy(update={"lead": lead})
     given = configuration.model_copy(update={"acquisition": acquisition})
-    command = [sys.executable, "-c", CLIENT % ACQUIRED, str(path)]
-    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as client:
-        assert client.stdin is not None
-        assert client.stdout is not None
-        client.stdin.write(given.model_dump_json() + "\n")
-        client.stdin.flush()
-        assert client.stdout.readline() == "began\n"
-        time.sleep(1.0)
-        # the process alone, as a debugger or an exhausted memory would
-        client.send_signal(signal.SIGSTOP)
-        time.sleep(STALL)
-        client.send_signal(signal.SIGCONT)
-        assert client.wait(LONG) == 0
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload(["tests.faults.emulated.preload"])
+    told, tell = context.Pipe(duplex=False)
+    client = context.Process(target=_record, args=(tell, given, path), daemon=True)
+    client.start()
+    tell.close()
+    assert told.recv() == "began"
+    assert client.pid is not None
+    time.sleep(1.0)
+    # the process alone, as a debugger or an exhausted memory would
+    os.kill(client.pid, signal.SIGSTOP)
+    time.sleep(STALL)
+    os.kill(client.pid, signal.SIGCONT)
+    client.join(LONG)
+    assert client.exitcode == 0
 
 
 def lost_values(record: DataFile) -> dict[str, int]:
