@@ -22,7 +22,7 @@ from tests.faults.samples import Making, invalid, late, lost_for, once, stuck
 from tests.protocols.harmonic.held_bench import CONFIGURATION, Begin, Story, Tape, TapedRig, captured, continued
 from tests.whole import partial
 
-pytestmark = pytest.mark.usefixtures("shared_results", "few_specimens")
+pytestmark = pytest.mark.usefixtures("shared_results", "no_specimens")
 
 OMEGA = 15.0
 PARAMETERS = HarmonicParameters(

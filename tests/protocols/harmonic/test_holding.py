@@ -13,7 +13,7 @@ from protocols.common.sine.holding import HoldCycle
 
 pytestmark = pytest.mark.usefixtures("shared_results", "few_specimens")
 
-QUICK = ["--settle-limit", "30", "--ramp-time", "4", "--harmonics", "5", "--starts", "2"]
+QUICK = ["--settle-limit", "15", "--ramp-time", "4", "--harmonics", "5", "--starts", "2"]
 
 
 def point(folder: Path, *options: str) -> dict[str, Any]:
