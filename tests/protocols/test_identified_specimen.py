@@ -14,7 +14,7 @@ from bench.config.result_files import write_specimen
 from sim.identified import Finding, Identified
 from sim.specimen import Frame
 
-pytestmark = pytest.mark.usefixtures("shared_results")
+pytestmark = pytest.mark.usefixtures("shared_results", "no_figures")
 
 FACTORS = {"k1": 1.05, "k2": 1.05, "xi1": 1.3, "xi2": 1.3}
 RESTITUTION, SPRING = 0.992, 0.9

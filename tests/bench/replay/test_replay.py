@@ -35,6 +35,7 @@ from sim.parameters import Parameters, quantity
 from sim.specimen import Specimen
 from sim.virtual_bench import VirtualBenchParameters
 from tests.recorded import recorded
+from tests.undrawn import undrawn
 
 BENCH = BenchConfiguration(
     acquisition=Acquisition(lead=0.1),
@@ -497,7 +498,8 @@ SHORT = ("--omega", "12", "18", "27", "40", "--cycles", "4", "--yes")
 def checked(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A loop check, as the command line leaves it."""
     folder = tmp_path_factory.mktemp("check")
-    assert main(["check", *SHORT, "--out", str(folder / "run")]) == 0
+    with undrawn():
+        assert main(["check", *SHORT, "--out", str(folder / "run")]) == 0
     return folder / "run" / "campaign.h5"
 
 

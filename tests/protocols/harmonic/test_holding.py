@@ -11,7 +11,7 @@ from bench.app.cli.main import main
 from bench.datafile.reader import open_datafile
 from protocols.common.sine.holding import HoldCycle
 
-pytestmark = pytest.mark.usefixtures("shared_results", "few_specimens")
+pytestmark = pytest.mark.usefixtures("shared_results", "few_specimens", "no_figures")
 
 QUICK = ["--settle-limit", "15", "--ramp-time", "4", "--harmonics", "5", "--starts", "2"]
 

@@ -22,6 +22,7 @@ from protocols.harmonic.campaign import HarmonicCampaign
 from protocols.harmonic.protocol import HarmonicParameters
 from sim.gain import predict_gain
 from sim.specimen import Specimen
+from tests.undrawn import undrawn
 
 pytestmark = pytest.mark.usefixtures("shared_results")
 
@@ -210,7 +211,8 @@ def test_the_run_shows_what_was_predicted(done: Path, seen: dict[str, float]) ->
 
 def test_the_same_seed_gives_the_same_numbers(done: Path, tmp_path: Path) -> None:
     """And what watched the first run changed nothing."""
-    _run(tmp_path / "again", "--seed", "3")
+    with undrawn():
+        _run(tmp_path / "again", "--seed", "3")
     assert _summary(tmp_path / "again")["points"] == _summary(done)["points"]
 
 
@@ -229,7 +231,8 @@ def test_a_specimen_that_is_not_as_assumed_is_flagged(tmp_path: Path) -> None:
     configuration = tmp_path / "differs.toml"
     sure = "[uncertainty]\nstiffness = 0.005\ndamping = 0.02\nrestitution = 0.001\nspring = 0.005\n"
     configuration.write_text(f"{QUICK}{sure}[simulation.specimen.frame]\nk2 = 60.0\n", encoding="utf-8")
-    _, folder = _run(tmp_path / "run", "--measured-cycles", "8", "--config", str(configuration))
+    with undrawn():
+        _, folder = _run(tmp_path / "run", "--measured-cycles", "8", "--config", str(configuration))
     (point,) = _summary(folder)["points"]
     assert point["agrees"] is False
     assert "difference from the prediction exceeds" in point["reason"]
