@@ -11,11 +11,12 @@ from bench.protocol import Protocol
 
 @contextmanager
 def undrawn() -> Iterator[None]:
-    """Commands that carry out a run write all of its files but the figures."""
+    """Commands and `bench.run` write all files of a run but its figures."""
+    import bench.app.run  # noqa: F401 - has the function under its own name
     from bench.app.session import SessionResult, run_session
 
     def without_figures(protocol: Protocol[Any], *arguments: Any, **options: Any) -> SessionResult:
         return run_session(replace(protocol, figures=()), *arguments, **options)
 
-    with patch("bench.app.session.run_session", without_figures):
+    with patch("bench.app.session.run_session", without_figures), patch("bench.app.run.run_session", without_figures):
         yield

@@ -286,7 +286,7 @@ def test_settings_that_need_more_than_was_recorded_are_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     bench = tmp_path / "bench.toml"
-    bench.write_text("[acquisition]\nblock_duration = 0.2\n[simulation.bench]\nsample_rate = 1000.0\n", encoding="utf-8")
+    bench.write_text("[acquisition]\nblock_duration = 0.2\n[simulation.bench]\nsample_rate = 1000.0\n")
     command = ["run", "free-vibration", "--repeats", "1", "--window", "10", "--config", str(bench), "--yes"]
     assert main([*command, "--out", str(tmp_path / "run")]) == 0
     file = tmp_path / "run" / "campaign.h5"
