@@ -42,7 +42,8 @@ def test_ctrl_c(tmp_path: Path) -> None:
 
 @pytest.mark.skipif(sys.platform == "win32", reason="sends SIGINT to one process")
 @pytest.mark.seconds
-@pytest.mark.parametrize("times", [1, 3])
+# `tests/bench/app/cli/test_interrupts.py` sends one signal while a run is planned
+@pytest.mark.parametrize("times", [pytest.param(1, marks=pytest.mark.soak), 3])
 def test_ctrl_c_while_the_run_is_planned(tmp_path: Path, times: int) -> None:
     """The default campaign plans its starts for many seconds, most of them in native code."""
     command = [sys.executable, "-m", "bench", "run", "harmonic", "--out", str(tmp_path / "run")]

@@ -116,7 +116,7 @@ def delayed(samples: int) -> Begin:
     [
         pytest.param(amplified(0.7, 0.0), 0.7, 0.0, id="gain too small"),
         pytest.param(amplified(1.3, 0.0), 1.3, 0.0, id="gain too large", marks=pytest.mark.soak),
-        pytest.param(amplified(1.0, LAG), 1.0, -40.0, id="phase"),
+        pytest.param(amplified(1.0, LAG), 1.0, -40.0, id="phase", marks=pytest.mark.soak),
         pytest.param(delayed(round(LAG / OMEGA * RATE)), 1.0, -40.0, id="samples late"),
     ],
 )

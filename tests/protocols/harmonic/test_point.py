@@ -227,6 +227,8 @@ def test_another_seed_gives_other_numbers(done: Path, tmp_path: Path) -> None:
 QUICK = "[acquisition]\nblock_duration = 0.2\n[simulation.bench]\nsample_rate = 1000.0\n"
 
 
+# `tests/protocols/test_identified_specimen.py` has another that is flagged
+@pytest.mark.soak
 def test_a_specimen_that_is_not_as_assumed_is_flagged(tmp_path: Path) -> None:
     configuration = tmp_path / "differs.toml"
     sure = "[uncertainty]\nstiffness = 0.005\ndamping = 0.02\nrestitution = 0.001\nspring = 0.005\n"
