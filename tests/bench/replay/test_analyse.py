@@ -32,7 +32,7 @@ from tests.recorded import recorded
 pytestmark = pytest.mark.usefixtures("no_figures")
 
 BENCH = BenchConfiguration(
-    acquisition=Acquisition(lead=0.05),
+    acquisition=Acquisition(block_duration=0.2, lead=0.05),
     simulation=Simulation(bench=VirtualBenchParameters(sample_rate=1000.0)),
     limits=Limits(drift=0.2, displacement=0.095),
 )
