@@ -151,7 +151,9 @@ def test_a_laser_that_loses_its_target_in_every_block_releases_the_hold(
     ("making", "says"),
     [
         pytest.param(invalid(LASER_1), "time without a valid sample from laser_1", id="laser lost"),
-        pytest.param(stuck(LASER_2), "time with a constant count of laser_2", id="laser frozen"),
+        pytest.param(
+            stuck(LASER_2), "time with a constant count of laser_2", id="laser frozen", marks=pytest.mark.soak
+        ),
         pytest.param(once(late(0.6)), "delay of a block of samples", id="block late"),
     ],
 )
