@@ -56,6 +56,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     frame = "".join(f"{name} = {truth()[name]!r}\n" for name in FACTORS)
     (path / "bench.toml").write_text(
         f"[acquisition]\nblock_duration = 0.2\n[simulation]\nspring_factor = {SPRING}\n"
+        "[simulation.bench]\nsample_rate = 1000.0\n"
         f"[simulation.specimen.frame]\n{frame}"
         f"[simulation.specimen.block]\nrestitution_factor = {RESTITUTION}\n",
         encoding="utf-8",

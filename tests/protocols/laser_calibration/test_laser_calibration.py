@@ -378,7 +378,7 @@ def test_a_calibration_on_the_simulated_bench_agrees_with_its_lasers_and_serves_
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out, blocks = tmp_path / "out", tmp_path / "blocks.toml"
-    blocks.write_text("[acquisition]\nblock_duration = 0.2\n", encoding="utf-8")
+    blocks.write_text("[acquisition]\nblock_duration = 0.2\n[simulation.bench]\nsample_rate = 1000.0\n")
     command = ["run", "laser-calibration", "--seed", "5", "--cycles", "4", "--passes", "6", "--config", str(blocks)]
     assert main([*command, "--out", str(out)]) == 0
     one = read_calibration(out / "laser_calibration.json")
@@ -411,7 +411,7 @@ def test_an_error_with_short_waves_is_found(tmp_path: Path) -> None:
     """Five and a half periods over the range; ten harmonics of each cycle would leave 21 um of it."""
     out, bench, periods = tmp_path / "out", tmp_path / "bench.toml", 5.5
     bench.write_text(
-        "[acquisition]\nblock_duration = 0.2\n[simulation.bench]\n"
+        "[acquisition]\nblock_duration = 0.2\n[simulation.bench]\nsample_rate = 1000.0\n"
         f"laser_1.linearity_periods = {periods}\nlaser_2.linearity_periods = {periods}\n",
         encoding="utf-8",
     )

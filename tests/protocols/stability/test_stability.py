@@ -19,8 +19,8 @@ from tests.visible_text import document_texts, faults
 pytestmark = pytest.mark.usefixtures("shared_results")
 
 QUICK = ["--harmonics", "5", "--starts", "2", "--measured-cycles", "12"]
-BLOCKS = "[acquisition]\nblock_duration = 0.2\n"
-"""Fewer blocks than usual, each shorter than a cycle."""
+BLOCKS = "[acquisition]\nblock_duration = 0.2\n[simulation.bench]\nsample_rate = 1000.0\n"
+"""Fewer blocks and samples than usual; each block is shorter than a cycle."""
 
 
 def points(folder: Path, *options: str) -> list[dict[str, Any]]:
