@@ -19,7 +19,7 @@ def test_ctrl_c(tmp_path: Path) -> None:
     folder = tmp_path / "run"
     command = [sys.executable, "-c", "from bench.app.cli.process import run; run()", "run", "harmonic"]
     # far longer than it takes to interrupt it
-    command += ["--omega", "16", "--beta", "0.4", "--measured-cycles", "1000", "--out", str(folder)]
+    command += ["--omega", "16", "--beta", "0.4", "--starts", "1", "--measured-cycles", "1000", "--out", str(folder)]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     try:
         _wait_until_running(folder / "campaign.h5", process)
