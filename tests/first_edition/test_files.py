@@ -1,6 +1,7 @@
 """Data files of the first edition, one of each protocol: opened, verified, replayed, analysed, reported, exported.
 
-Without `-m soak` all are opened, verified and replayed but the longest, and some are put through the rest as well.
+Without `-m soak` all are opened and verified, all but the longest are replayed (`test_results` carries these out anew),
+and some are put through the rest as well.
 """
 
 import json
