@@ -232,3 +232,12 @@ def shared_results(tmp_path_factory: pytest.TempPathFactory) -> Generator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("bench.result_cache._folder", lambda: folder / "shared_results")
         yield
+
+
+@pytest.fixture(scope="module")
+def no_figures() -> Generator[None]:
+    """For modules that look at no figure of the runs that their commands carry out."""
+    from tests.undrawn import undrawn
+
+    with undrawn():
+        yield

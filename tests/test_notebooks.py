@@ -48,7 +48,7 @@ def test_a_notebook_is_valid_and_has_no_outputs(path: Path) -> None:
 
 
 @pytest.mark.timeout(400)
-@pytest.mark.usefixtures("shared_results")
+@pytest.mark.usefixtures("shared_results", "no_figures")
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_a_notebook_runs_from_top_to_bottom(path: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from matplotlib import pyplot

@@ -1,6 +1,7 @@
 """Data files of the first edition, one of each protocol: opened, verified, replayed, analysed, reported, exported.
 
-Without `-m soak` all are opened, verified and replayed but the longest, and some are put through the rest as well.
+Without `-m soak` all are opened and verified, all but the longest are replayed (`test_results` carries these out anew),
+and some are put through the rest as well.
 """
 
 import json
@@ -17,7 +18,7 @@ from tests.first_edition.command import DATA, OF_CALIBRATION, OF_CALIBRATION_RAT
 pytestmark = pytest.mark.usefixtures("shared_results")
 
 NAMES = sorted(path.name.removesuffix(".h5.xz") for path in DATA.glob("*.h5.xz"))
-LONGEST = {"harmonic_springs"}
+LONGEST = {"harmonic_springs", "coupling_stiffness"}
 QUICK = {"check", "free_rocking", "identify"}
 PROTOCOLS = {
     "check",
@@ -112,8 +113,8 @@ def test_it_is_analysed_again(file: Path, rockbench: Rockbench, same_arithmetic:
     assert rockbench("file", "verify", again).code == 0
 
 
-# the report of `check` is read by `test_inventory`, section by section
-@of(QUICK - {"check"})
+# the report of `check` is read by `test_inventory`, section by section; `test_visible_text` makes one of every file
+@of({"identify"})
 def test_it_is_reported(file: Path, rockbench: Rockbench, tmp_path: Path) -> None:
     page = tmp_path / "report.html"
     done = rockbench("report", file, "--html", page)

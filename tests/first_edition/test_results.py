@@ -21,11 +21,10 @@ QUICK = {
     "coupling_stiffness",
     "earthquake",
     "free_rocking",
-    "free_vibration",
     "harmonic_springs",
 }
-"""One run of each protocol that is not long. The other run of the harmonic protocol is replayed from its file, with the
-twin, by `test_files`."""
+"""One run of each protocol that is not long; that of the springs has decays of the bare frame as well. The other run of
+the harmonic protocol is replayed from its file, with the twin, by `test_files`."""
 
 RENAMED = {"predicted for the asked motion": "predicted for the requested motion"}
 """What keys and texts of the first edition are called today, by each part of them that was renamed: standard terms."""

@@ -19,7 +19,7 @@ def test_ctrl_c(tmp_path: Path) -> None:
     folder = tmp_path / "run"
     command = [sys.executable, "-c", "from bench.app.cli.process import run; run()", "run", "harmonic"]
     # far longer than it takes to interrupt it
-    command += ["--omega", "16", "--beta", "0.4", "--measured-cycles", "1000", "--out", str(folder)]
+    command += ["--omega", "16", "--beta", "0.4", "--starts", "1", "--measured-cycles", "1000", "--out", str(folder)]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     try:
         _wait_until_running(folder / "campaign.h5", process)
@@ -42,7 +42,8 @@ def test_ctrl_c(tmp_path: Path) -> None:
 
 @pytest.mark.skipif(sys.platform == "win32", reason="sends SIGINT to one process")
 @pytest.mark.seconds
-@pytest.mark.parametrize("times", [1, 3])
+# `tests/bench/app/cli/test_interrupts.py` sends one signal while a run is planned
+@pytest.mark.parametrize("times", [pytest.param(1, marks=pytest.mark.soak), 3])
 def test_ctrl_c_while_the_run_is_planned(tmp_path: Path, times: int) -> None:
     """The default campaign plans its starts for many seconds, most of them in native code."""
     command = [sys.executable, "-m", "bench", "run", "harmonic", "--out", str(tmp_path / "run")]

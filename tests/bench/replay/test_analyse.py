@@ -29,8 +29,10 @@ from sim.specimen import Frame, Specimen
 from sim.virtual_bench import VirtualBenchParameters
 from tests.recorded import recorded
 
+pytestmark = pytest.mark.usefixtures("no_figures")
+
 BENCH = BenchConfiguration(
-    acquisition=Acquisition(lead=0.05),
+    acquisition=Acquisition(block_duration=0.2, lead=0.05),
     simulation=Simulation(bench=VirtualBenchParameters(sample_rate=1000.0)),
     limits=Limits(drift=0.2, displacement=0.095),
 )
@@ -283,7 +285,10 @@ def test_another_protocol_is_carried_out_again_unless_it_would_have_driven_other
 def test_settings_that_need_more_than_was_recorded_are_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["run", "free-vibration", "--repeats", "1", "--yes", "--out", str(tmp_path / "run")]) == 0
+    bench = tmp_path / "bench.toml"
+    bench.write_text("[acquisition]\nblock_duration = 0.2\n[simulation.bench]\nsample_rate = 1000.0\n")
+    command = ["run", "free-vibration", "--repeats", "1", "--window", "10", "--config", str(bench), "--yes"]
+    assert main([*command, "--out", str(tmp_path / "run")]) == 0
     file = tmp_path / "run" / "campaign.h5"
     capsys.readouterr()
     assert main(["analyse", str(file), "--set", "repeats=2", "--json"]) == 2

@@ -35,6 +35,7 @@ from sim.parameters import Parameters, quantity
 from sim.specimen import Specimen
 from sim.virtual_bench import VirtualBenchParameters
 from tests.recorded import recorded
+from tests.undrawn import undrawn
 
 BENCH = BenchConfiguration(
     acquisition=Acquisition(lead=0.1),
@@ -228,27 +229,38 @@ def test_every_ending_comes_again(again: Callable[[str], Replayed], ending: str,
     assert replayed.found.compared["estimates"] == len(replayed.points)
 
 
-def with_lead(folder: Path, stored: str | None) -> Path:
-    """A run on a rig whose lead is 7 samples longer than the configured one; `stored` is what its file says of it."""
-    rig = loopback(lead=BENCH.lead_samples + 7)
-    metadata = {} if stored is None else {"lead": stored}
-    recorded(folder / "run.h5", Two().plan(BENCH), rig, BENCH, Found, metadata)
-    return folder / "run.h5"
+@pytest.fixture(scope="module")
+def led(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The data file of a run on a rig whose lead is 7 samples longer than the configured one."""
+    path, lead = tmp_path_factory.mktemp("led") / "run.h5", BENCH.lead_samples + 7
+    recorded(path, Two().plan(BENCH), loopback(lead=lead), BENCH, Found, {"lead": f"{lead}"})
+    return path
 
 
-def test_the_lead_of_the_open_rig_counts_not_the_configured_one(tmp_path: Path) -> None:
-    assert played(with_lead(tmp_path, f"{BENCH.lead_samples + 7}")).identical
+def with_lead(path: Path, folder: Path, stored: str | None) -> Path:
+    """A copy of a run; `stored` is what it says of the lead."""
+    path = copied(path, folder)
+    with h5py.File(path, "r+") as file:
+        metadata = file["entry/metadata"]
+        del metadata["lead"]
+        if stored is not None:
+            metadata["lead"] = stored
+    return path
 
 
-def test_a_file_without_the_lead_of_its_rig_has_the_configured_one(tmp_path: Path) -> None:
+def test_the_lead_of_the_open_rig_counts_not_the_configured_one(led: Path) -> None:
+    assert played(led).identical
+
+
+def test_a_file_without_the_lead_of_its_rig_has_the_configured_one(led: Path, tmp_path: Path) -> None:
     """As written by earlier versions."""
-    assert played(with_lead(tmp_path, None)).found.differences[0].part == DRIVE
+    assert played(with_lead(led, tmp_path, None)).found.differences[0].part == DRIVE
 
 
 @pytest.mark.parametrize("stored", ["", "-1", "7.5", "10001", "9" * 5000, "²"])
-def test_a_lead_that_is_none_is_refused(tmp_path: Path, stored: str) -> None:
+def test_a_lead_that_is_none_is_refused(led: Path, tmp_path: Path, stored: str) -> None:
     with pytest.raises(InvalidInput, match="it must be a number of samples from 0 to 10000"):
-        played(with_lead(tmp_path, stored))
+        played(with_lead(led, tmp_path, stored))
 
 
 def test_a_limit_that_was_exceeded_is_exceeded_again(kept: Callable[[str], Path]) -> None:
@@ -372,10 +384,17 @@ def _reworded(path: Path) -> None:
 
 
 REPLAYED = ("completed", "client lost", "halt", "declined", "stopped in a question", "emergency stop", "late", "error")
+REWORDED = {"completed", "stopped in a question", "emergency stop", "error"}
+"""One ending of each kind: by the plan, by a person, by the rig, by an error; the others with the mark soak."""
 
 
-@pytest.mark.parametrize("ending", REPLAYED)
-@pytest.mark.parametrize("reworded", [False, True])
+@pytest.mark.parametrize(
+    ("ending", "reworded"),
+    [
+        *((ending, False) for ending in REPLAYED),
+        *(pytest.param(each, True, marks=() if each in REWORDED else pytest.mark.soak) for each in REPLAYED),
+    ],
+)
 def test_a_file_replays_by_its_columns_whatever_the_wording(
     kept: Callable[[str], Path], again: Callable[[str], Replayed], tmp_path: Path, ending: str, reworded: bool
 ) -> None:
@@ -497,7 +516,8 @@ SHORT = ("--omega", "12", "18", "27", "40", "--cycles", "4", "--yes")
 def checked(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A loop check, as the command line leaves it."""
     folder = tmp_path_factory.mktemp("check")
-    assert main(["check", *SHORT, "--out", str(folder / "run")]) == 0
+    with undrawn():
+        assert main(["check", *SHORT, "--out", str(folder / "run")]) == 0
     return folder / "run" / "campaign.h5"
 
 

@@ -18,6 +18,7 @@ from bench.rigs import open_rig
 from drivers.rig import Channel, Rig
 from protocols.check.experiment import LoopCheck
 from protocols.check.protocol import CheckParameters
+from tests.undrawn import undrawn
 
 SHORT = ("--cycles", "4", "--rest", "1")
 LONG_BLOCKS = "[acquisition]\nblock_duration = 0.2\n"
@@ -32,7 +33,8 @@ def check(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Check:
     def run(configuration: str = "", *flags: str) -> tuple[int, list[dict[str, Any]]]:
         file = tmp_path / "bench.toml"
         file.write_text(configuration if flags else LONG_BLOCKS + configuration, encoding="utf-8")
-        code = main(["check", "--config", str(file), "--out", str(tmp_path / "out"), "--json", *(flags or SHORT)])
+        with undrawn():
+            code = main(["check", "--config", str(file), "--out", str(tmp_path / "out"), "--json", *(flags or SHORT)])
         return code, json.loads(capsys.readouterr().out)["points"]
 
     return run

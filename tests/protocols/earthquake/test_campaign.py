@@ -19,6 +19,8 @@ from sim.specimen import Specimen
 from tests.bench.control.virtual_table import bench_with, identify
 
 TOPPLES, STANDS = 0.25, 0.97
+BAND = ("--table-band", "1.5:25")
+"""A band that the model of the table covers."""
 
 
 @pytest.fixture(scope="module")
@@ -39,7 +41,7 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def done(bench: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Three times the acceleration that lifts the block: nine of ten draws topple it with the soft spring."""
     folder = tmp_path_factory.mktemp("earthquake") / "run"
-    asked = ["synthetic:kobe", "--table-band", "1.5:25", "--peak-factor", "3"]
+    asked = ["synthetic:kobe", *BAND, "--peak-factor", "3"]
     asked += ["--beta", str(TOPPLES), "--beta", str(STANDS)]
     code = main(["run", "earthquake", *asked, "--draws", "40", "--json", "--config", str(bench), "--out", str(folder)])
     assert code == 0
@@ -145,19 +147,19 @@ def test_the_data_file_replays_without_the_files_that_the_run_read(
 @pytest.mark.parametrize(
     ("flags", "said"),
     [
-        (["nowhere.AT2"], "nowhere.AT2"),
-        (["synthetic:kobe", "synthetic:kobe"], "is already used by"),
+        (["nowhere.AT2", *BAND], "nowhere.AT2"),
+        (["synthetic:kobe", "synthetic:kobe", *BAND], "is already used by"),
         (["synthetic:kobe", "--table-band", "0.5:25"], "within the table's band, 1 to 100 Hz"),
         (["synthetic:kobe", "--table-band", "20:10"], "two ascending frequencies above 0 Hz"),
         (["synthetic:kobe", "--table-band", "none"], "must be filtered to a band"),
         (["synthetic:kobe", "--beta", "0.5", "0.5"], "each value may occur only once"),
-        (["synthetic:kobe", "--peak-factor", "5"], "limits."),
+        (["synthetic:kobe", "--peak-factor", "5", *BAND], "limits."),
     ],
 )
 def test_refused_before_anything_starts(
-    flags: list[str], said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    flags: list[str], said: str, bench: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    code = main(["run", "earthquake", *flags, "--out", str(tmp_path / "run")])
+    code = main(["run", "earthquake", *flags, "--config", str(bench), "--out", str(tmp_path / "run")])
     error = capsys.readouterr().err
     assert code == 2
     # what was done until then stands before it

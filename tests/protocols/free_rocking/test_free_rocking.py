@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -54,11 +55,11 @@ class Declining(Unattended):
 
 
 def run(
-    configuration: BenchConfiguration, out: Path, operator: Unattended | None = None
+    configuration: BenchConfiguration, out: Path, operator: Unattended | None = None, *, figures: bool = False
 ) -> tuple[SessionResult, list[Event]]:
     events: list[Event] = []
     result = run_session(
-        PROTOCOL,
+        PROTOCOL if figures else replace(PROTOCOL, figures=()),
         PROTOCOL.prepare(SHORT, configuration, None),
         out=out,
         operator=operator or Unattended(),
@@ -75,7 +76,7 @@ Session = tuple[Path, SessionResult, list[Event]]
 @pytest.fixture(scope="module")
 def session(tmp_path_factory: pytest.TempPathFactory) -> Session:
     out = tmp_path_factory.mktemp("free_rocking") / "run"
-    return out, *run(bench(), out)
+    return out, *run(bench(), out, figures=True)
 
 
 def test_the_restitution_is_found_within_its_uncertainty(session: Session) -> None:

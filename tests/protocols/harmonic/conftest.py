@@ -12,6 +12,16 @@ def few_specimens() -> Iterator[None]:
     """The ranges are those of 21 drawn specimens, hardly more than the 20 with which peaks are compared with them: 39
     take five seconds of processor time.
     """
+    yield from _drawn(21)
+
+
+@pytest.fixture(scope="module")
+def no_specimens() -> Iterator[None]:
+    """There are no ranges, which nothing is compared with: even those of 21 specimens take two seconds."""
+    yield from _drawn(0)
+
+
+def _drawn(members: int) -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(free_prediction, "MEMBERS", 21)
+        patch.setattr(free_prediction, "MEMBERS", members)
         yield

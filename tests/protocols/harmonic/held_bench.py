@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.config.model import BenchConfiguration
-from bench.config.sections import Acquisition
+from bench.config.sections import Acquisition, Simulation
 from bench.control.stabiliser import CAPTURED, QUIET
 from bench.engine.engine import configured_engine
 from bench.engine.interface import Ending, EventStream, Requests, Unattended
@@ -25,11 +25,14 @@ from protocols.harmonic.campaign import HarmonicCampaign
 from protocols.harmonic.protocol import HarmonicPoint
 from sim.kernel import table
 from sim.specimen import Specimen
-from sim.virtual_bench import VirtualBench
+from sim.virtual_bench import VirtualBench, VirtualBenchParameters
 from tests.faults.rig import FaultyRig
 from tests.recorded import recorded
 
-CONFIGURATION = BenchConfiguration(acquisition=Acquisition(block_duration=0.2))
+CONFIGURATION = BenchConfiguration(
+    acquisition=Acquisition(block_duration=0.2),
+    simulation=Simulation(bench=VirtualBenchParameters(sample_rate=1000.0)),
+)
 
 Array = NDArray[np.float64]
 

@@ -7,6 +7,8 @@ from protocols.harmonic import free_prediction
 from protocols.harmonic.free_prediction import with_free_prediction
 from protocols.harmonic.protocol import HarmonicPoint, PointStatus
 
+pytestmark = pytest.mark.usefixtures("shared_results")
+
 CONFIGURATION = BenchConfiguration()
 SPECIMEN = CONFIGURATION.known_specimen.coupled(0.97)
 AMPLITUDE = 1.01 * SPECIMEN.uplift_acceleration

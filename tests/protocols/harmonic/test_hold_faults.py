@@ -22,7 +22,7 @@ from tests.faults.samples import Making, invalid, late, lost_for, once, stuck
 from tests.protocols.harmonic.held_bench import CONFIGURATION, Begin, Story, Tape, TapedRig, captured, continued
 from tests.whole import partial
 
-pytestmark = pytest.mark.usefixtures("shared_results", "few_specimens")
+pytestmark = pytest.mark.usefixtures("shared_results", "no_specimens")
 
 OMEGA = 15.0
 PARAMETERS = HarmonicParameters(
@@ -116,7 +116,7 @@ def delayed(samples: int) -> Begin:
     [
         pytest.param(amplified(0.7, 0.0), 0.7, 0.0, id="gain too small"),
         pytest.param(amplified(1.3, 0.0), 1.3, 0.0, id="gain too large", marks=pytest.mark.soak),
-        pytest.param(amplified(1.0, LAG), 1.0, -40.0, id="phase"),
+        pytest.param(amplified(1.0, LAG), 1.0, -40.0, id="phase", marks=pytest.mark.soak),
         pytest.param(delayed(round(LAG / OMEGA * RATE)), 1.0, -40.0, id="samples late"),
     ],
 )
@@ -151,7 +151,9 @@ def test_a_laser_that_loses_its_target_in_every_block_releases_the_hold(
     ("making", "says"),
     [
         pytest.param(invalid(LASER_1), "time without a valid sample from laser_1", id="laser lost"),
-        pytest.param(stuck(LASER_2), "time with a constant count of laser_2", id="laser frozen"),
+        pytest.param(
+            stuck(LASER_2), "time with a constant count of laser_2", id="laser frozen", marks=pytest.mark.soak
+        ),
         pytest.param(once(late(0.6)), "delay of a block of samples", id="block late"),
     ],
 )

@@ -29,7 +29,7 @@ from sim.specimen import Specimen
 from sim.steady import Orbit
 from tests.protocols.harmonic.scripted import AMPLITUDE, Script, cycle
 
-pytestmark = pytest.mark.usefixtures("shared_results", "few_specimens")
+pytestmark = pytest.mark.usefixtures("shared_results", "no_specimens")
 
 OMEGA, BETA = 15.0, 0.97
 PARAMETERS = HarmonicParameters(omega=(OMEGA,), beta=(BETA,), starts=1, settle_limit=30.0, measured_cycles=12)

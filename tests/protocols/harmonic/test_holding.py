@@ -11,14 +11,15 @@ from bench.app.cli.main import main
 from bench.datafile.reader import open_datafile
 from protocols.common.sine.holding import HoldCycle
 
-pytestmark = pytest.mark.usefixtures("shared_results", "few_specimens")
+pytestmark = pytest.mark.usefixtures("shared_results", "few_specimens", "no_figures")
 
-QUICK = ["--settle-limit", "30", "--ramp-time", "4", "--harmonics", "5", "--starts", "2"]
+QUICK = ["--settle-limit", "15", "--ramp-time", "4", "--harmonics", "5", "--starts", "2"]
+BLOCKS = "[acquisition]\nblock_duration = 0.2\n[simulation.bench]\nsample_rate = 1000.0\n"
 
 
 def point(folder: Path, *options: str) -> dict[str, Any]:
     blocks = folder.parent / "blocks.toml"
-    blocks.write_text("[acquisition]\nblock_duration = 0.2\n", encoding="utf-8")
+    blocks.write_text(BLOCKS, encoding="utf-8")
     command = ["run", "harmonic", "--yes", "--json", "--omega", "15", "--beta", "0.97", "--config", str(blocks)]
     assert main([*command, *QUICK, "--seed", "7", "--out", str(folder), *options]) == 0
     (found,) = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["points"]

@@ -17,7 +17,7 @@ from protocols.harmonic.protocol import HarmonicParameters
 from sim.errors import InvalidInput
 from tests.protocols.harmonic.test_holding import point, replayed_and_analysed
 
-pytestmark = pytest.mark.usefixtures("shared_results", "few_specimens")
+pytestmark = pytest.mark.usefixtures("shared_results", "few_specimens", "no_figures")
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,7 @@ from bench.analysis.signals import DRIFT, SignalMap
 from bench.app.cli.main import main
 from bench.app.preflight import compile_run
 from bench.config.model import BenchConfiguration
-from bench.config.sections import Simulation
+from bench.config.sections import Acquisition, Simulation
 from bench.guard.conversion import Extremes
 from bench.guard.limits import Violation
 from bench.guard.motion import MotionWatch
@@ -22,15 +22,25 @@ from protocols.harmonic.campaign import HarmonicCampaign
 from protocols.harmonic.protocol import HarmonicParameters
 from sim.gain import predict_gain
 from sim.specimen import Specimen
+from tests.undrawn import undrawn
 
 pytestmark = pytest.mark.usefixtures("shared_results")
 
 OMEGA, BETA = 16.0, 0.4
+CONFIGURATION = BenchConfiguration(acquisition=Acquisition(block_duration=0.2))
+"""Fewer blocks than usual take less time."""
 
 
 def _run(folder: Path, *flags: str) -> tuple[int, Path]:
     code = main(["run", "harmonic", "--omega", "16", "--beta", "0.4", "--yes", "--json", "--out", str(folder), *flags])
     return code, folder
+
+
+def _in_blocks(folder: Path, seed: int) -> tuple[int, Path]:
+    """The run of `CONFIGURATION`, with a seed."""
+    file = folder.parent / "blocks.toml"
+    file.write_text(f"[acquisition]\nblock_duration = {CONFIGURATION.acquisition.block_duration}\n", encoding="utf-8")
+    return _run(folder, "--seed", f"{seed}", "--config", str(file))
 
 
 def _summary(folder: Path) -> dict[str, Any]:
@@ -78,7 +88,7 @@ def seen() -> dict[str, float]:
 def done(tmp_path_factory: pytest.TempPathFactory, seen: dict[str, float]) -> Path:
     with pytest.MonkeyPatch.context() as patch:
         largest = _largest_seen(patch)
-        code, folder = _run(tmp_path_factory.mktemp("seed3") / "run", "--seed", "3")
+        code, folder = _in_blocks(tmp_path_factory.mktemp("seed3") / "run", 3)
     assert code == 0
     seen.update(largest)
     return folder
@@ -194,7 +204,7 @@ def test_the_run_shows_what_was_predicted(done: Path, seen: dict[str, float]) ->
         assert entry["planned_drive/omega"].shape[0] > 20
         stored = entry["metadata/plan_hash"][()].decode()
     assert _summary(done)["plan_hash"] == stored
-    configuration = BenchConfiguration(simulation=Simulation(seed=3))
+    configuration = CONFIGURATION.model_copy(update={"simulation": Simulation(seed=3)})
     campaign = HarmonicCampaign(HarmonicParameters(omega=(OMEGA,), beta=(BETA,)), configuration)
     found = compile_run("harmonic", campaign, Path())
     assert found.plan_hash == stored
@@ -210,13 +220,14 @@ def test_the_run_shows_what_was_predicted(done: Path, seen: dict[str, float]) ->
 
 def test_the_same_seed_gives_the_same_numbers(done: Path, tmp_path: Path) -> None:
     """And what watched the first run changed nothing."""
-    _run(tmp_path / "again", "--seed", "3")
+    with undrawn():
+        _in_blocks(tmp_path / "again", 3)
     assert _summary(tmp_path / "again")["points"] == _summary(done)["points"]
 
 
 @pytest.mark.soak
 def test_another_seed_gives_other_numbers(done: Path, tmp_path: Path) -> None:
-    _run(tmp_path / "other", "--seed", "4")
+    _in_blocks(tmp_path / "other", 4)
     other, first = (_summary(folder)["points"][0] for folder in (tmp_path / "other", done))
     assert other["alpha_2"] != first["alpha_2"]
     assert other["alpha_2"] == pytest.approx(first["alpha_2"], rel=0.02)
@@ -225,11 +236,14 @@ def test_another_seed_gives_other_numbers(done: Path, tmp_path: Path) -> None:
 QUICK = "[acquisition]\nblock_duration = 0.2\n[simulation.bench]\nsample_rate = 1000.0\n"
 
 
+# `tests/protocols/test_identified_specimen.py` has another that is flagged
+@pytest.mark.soak
 def test_a_specimen_that_is_not_as_assumed_is_flagged(tmp_path: Path) -> None:
     configuration = tmp_path / "differs.toml"
     sure = "[uncertainty]\nstiffness = 0.005\ndamping = 0.02\nrestitution = 0.001\nspring = 0.005\n"
     configuration.write_text(f"{QUICK}{sure}[simulation.specimen.frame]\nk2 = 60.0\n", encoding="utf-8")
-    _, folder = _run(tmp_path / "run", "--measured-cycles", "8", "--config", str(configuration))
+    with undrawn():
+        _, folder = _run(tmp_path / "run", "--measured-cycles", "8", "--config", str(configuration))
     (point,) = _summary(folder)["points"]
     assert point["agrees"] is False
     assert "difference from the prediction exceeds" in point["reason"]

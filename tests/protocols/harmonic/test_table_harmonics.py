@@ -45,9 +45,18 @@ def _bare(omega: float, order: int, share: complex) -> float:
 @pytest.mark.parametrize(
     ("beta", "omega"),
     [
-        *((0.25, omega) for omega in (12.5, 15.0, 17.5, 20.0)),
-        *((0.64, omega) for omega in (15.0, 17.5, 20.0)),
-        *((0.97, omega) for omega in (12.5, 17.5, 20.0)),
+        # each spring where its gain changes most
+        (0.25, 12.5),
+        (0.64, 20.0),
+        (0.97, 12.5),
+        *(
+            pytest.param(*each, marks=pytest.mark.soak)
+            for each in (
+                *((0.25, omega) for omega in (15.0, 17.5, 20.0)),
+                *((0.64, omega) for omega in (15.0, 17.5)),
+                *((0.97, omega) for omega in (17.5, 20.0)),
+            )
+        ),
     ],
 )
 def test_what_is_left_of_the_harmonics_changes_the_gain_by_less_than_a_tenth_of_its_uncertainty(

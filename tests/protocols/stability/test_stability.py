@@ -19,10 +19,14 @@ from tests.visible_text import document_texts, faults
 pytestmark = pytest.mark.usefixtures("shared_results")
 
 QUICK = ["--harmonics", "5", "--starts", "2", "--measured-cycles", "12"]
+BLOCKS = "[acquisition]\nblock_duration = 0.2\n[simulation.bench]\nsample_rate = 1000.0\n"
+"""Fewer blocks and samples than usual; each block is shorter than a cycle."""
 
 
 def points(folder: Path, *options: str) -> list[dict[str, Any]]:
-    command = ["run", "stability", "--yes", "--json", "--out", str(folder), *QUICK, *options]
+    blocks = folder.parent / "blocks.toml"
+    blocks.write_text(BLOCKS, encoding="utf-8")
+    command = ["run", "stability", "--yes", "--json", "--config", str(blocks), "--out", str(folder), *QUICK, *options]
     assert main(command) == 0
     return json.loads((folder / "summary.json").read_text(encoding="utf-8"))["points"]
 
