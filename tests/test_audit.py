@@ -30,7 +30,8 @@ def assert_honest(study: Study, benches: int) -> None:
 @pytest.mark.parametrize(
     ("name", "benches"),
     [
-        # `tests/protocols/harmonic/test_point.py` has a bench of alpha_2, of which each takes longer
+        # few of the gain under a sine, of which each takes longer
+        ("alpha_2, default, 16, 0.4", 5),
         ("record, default, pacoima, 0.97", 12),
         *(
             pytest.param(name, benches, marks=pytest.mark.soak)
