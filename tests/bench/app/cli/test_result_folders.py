@@ -37,7 +37,7 @@ for folder, *arguments in json.loads(sys.argv[2]):
     print("ready", flush=True)
     sys.stdin.readline()
     with redirect_stdout(StringIO()), redirect_stderr(StringIO()) as errors:
-        code = main(["run", "harmonic", "--omega", "16", "--yes", *arguments])
+        code = main(["run", "free-vibration", "--yes", *arguments])
     print(json.dumps([code, errors.getvalue()]), flush=True)
 """
 """Runs with a clock that stands still and without their bench: what is left is the command and the folder."""
@@ -81,7 +81,7 @@ def together(tmp_path_factory: pytest.TempPathFactory) -> Together:
 def test_two_runs_in_the_same_second_have_a_folder_each(together: Together) -> None:
     folder, ended = next(iter(together.items()))
     assert [code for code, _ in ended] == [0, 0]
-    name = "harmonic-2026-01-02T03-04-05"
+    name = "free-vibration-2026-01-02T03-04-05"
     folders = sorted(path.name for path in (folder / "runs").iterdir())
     assert folders == [name, f"{name}-2"]
     assert {(folder / "runs" / each / "campaign.h5").read_text() for each in folders} == {"first", "second"}

@@ -68,7 +68,7 @@ def test_a_run_goes_on_without_its_display(
 
 
 @pytest.mark.usefixtures("plugged")
-@pytest.mark.parametrize("how", ["closed pipe", "full disk"])
+@pytest.mark.parametrize("how", ["full disk", pytest.param("closed pipe", marks=pytest.mark.soak)])
 def test_a_command_whose_standard_error_is_gone_ends_well(how: str, tmp_path: Path) -> None:
     if how == "full disk" and not FULL.exists():
         pytest.skip("no device that is always full")
