@@ -98,11 +98,11 @@ run()
 """
 
 
+@pytest.mark.usefixtures("plugged")
 @pytest.mark.skipif(sys.platform == "win32", reason="there is no SIGHUP")
 def test_a_run_started_with_nohup_outlasts_its_terminal(tmp_path: Path) -> None:
     out = tmp_path / "run"
-    options = ["--omega", "12", "18", "27", "40", "--cycles", "4", "--yes", "--out", str(out), "--json"]
-    process = subprocess.Popen([sys.executable, "-c", NOHUP, "check", *options], stdout=subprocess.PIPE)
+    process = subprocess.Popen([sys.executable, "-c", NOHUP, *RUN, "--out", str(out), "--json"], stdout=subprocess.PIPE)
     try:
         eventually((out / "campaign.h5").exists)
         process.send_signal(signal.SIGHUP)
