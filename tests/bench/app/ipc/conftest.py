@@ -5,6 +5,7 @@ from collections.abc import Generator
 import pytest
 
 from bench.app.catalogue import PROTOCOLS
+from tests.forked_sessions import ForkedSessions
 from tests.installed import installed
 
 
@@ -14,3 +15,15 @@ def _shaking_is_installed(tmp_path_factory: pytest.TempPathFactory) -> Generator
     entry_points = {PROTOCOLS: {"shaking": "tests.bench.app.ipc.experiment:SHAKING"}}
     with installed(tmp_path_factory.mktemp("shaking"), "rockbench-shaking", entry_points):
         yield
+
+
+@pytest.fixture(scope="package")
+def _forked_sessions() -> Generator[ForkedSessions]:
+    with ForkedSessions() as sessions:
+        yield sessions
+
+
+@pytest.fixture
+def forked(_forked_sessions: ForkedSessions, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Sessions that a test starts are forked, which saves it the second that a session takes to load the program."""
+    _forked_sessions.use(monkeypatch)
