@@ -1,7 +1,7 @@
 """Sessions in processes that are forked from one which has imported what they need: they begin in milliseconds.
 
-Everything else is the program's: the process of a session reads its client's address, connects, and ends by itself or by
-a signal. Where there is no fork, as on Windows, each session is started by itself.
+Everything else is the program's: the process of a session reads the address of its client, connects, and ends by itself
+or by a signal. Where there is no fork, as on Windows, each session is started by itself.
 """
 
 import json
@@ -14,10 +14,6 @@ import tempfile
 import threading
 from types import SimpleNamespace
 from typing import IO, Any, Self
-
-import pytest
-
-FORKS = sys.platform != "win32"
 
 _SERVER = """
 import json, os, socket, sys
@@ -63,7 +59,12 @@ while True:
         # an end of the standard input that stayed open here would keep it open for the session
         os.close(handles[0])
         os.write(handles[2], b"%d\\n" % child)
-        os.write(handles[2], b"%d\\n" % os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
+        code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+        try:
+            os.write(handles[2], b"%d\\n" % code)
+        except BrokenPipeError:
+            # the client of this session was killed
+            pass
         os._exit(0)
     for handle in handles:
         os.close(handle)
@@ -107,8 +108,19 @@ class ForkedProcess:
             os.kill(self.pid, signal.SIGKILL)
 
 
+def forking(link: socket.socket) -> SimpleNamespace:
+    """In place of the module `subprocess` in `bench.app.ipc.client`: sessions are forked by the server at the other end
+    of `link`.
+    """
+
+    def start(_command: object, *, stdout: IO[bytes], **_more: Any) -> ForkedProcess:
+        return ForkedProcess(link, stdout)
+
+    return SimpleNamespace(Popen=start, PIPE=subprocess.PIPE)
+
+
 class ForkedSessions:
-    """Within, there is a process that sessions can be forked from; it begins with the first one."""
+    """Within, there is a process that sessions can be forked from; it begins when it is first used."""
 
     def __init__(self) -> None:
         self._server: subprocess.Popen[bytes] | None = None
@@ -116,8 +128,9 @@ class ForkedSessions:
         # not a pipe, which nobody would read
         self._errors = tempfile.TemporaryFile()  # noqa: SIM115 - closed at the end
 
-    def start(self, _command: object, *, stdout: IO[bytes], **_more: Any) -> ForkedProcess:
-        """In place of `subprocess.Popen` for a session."""
+    @property
+    def link(self) -> socket.socket:
+        """For `forking`, here or in a child process."""
         if self._link is None:
             self._link, there = socket.socketpair()
             command = [sys.executable, "-P", "-c", _SERVER, str(there.fileno())]
@@ -125,13 +138,7 @@ class ForkedSessions:
                 self._server = subprocess.Popen(
                     command, pass_fds=[there.fileno()], stdin=subprocess.DEVNULL, stderr=self._errors
                 )
-        return ForkedProcess(self._link, stdout)
-
-    def use(self, patch: pytest.MonkeyPatch) -> None:
-        """Fork the sessions of clients in this process from now on."""
-        if FORKS:
-            forking = SimpleNamespace(Popen=self.start, PIPE=subprocess.PIPE)
-            patch.setattr("bench.app.ipc.client.subprocess", forking)
+        return self._link
 
     def __enter__(self) -> Self:
         return self

@@ -1,11 +1,12 @@
 """What the tests of the link share."""
 
+import sys
 from collections.abc import Generator
 
 import pytest
 
 from bench.app.catalogue import PROTOCOLS
-from tests.forked_sessions import ForkedSessions
+from tests.forked_sessions import ForkedSessions, forking
 from tests.installed import installed
 
 
@@ -17,13 +18,8 @@ def _shaking_is_installed(tmp_path_factory: pytest.TempPathFactory) -> Generator
         yield
 
 
-@pytest.fixture(scope="package")
-def _forked_sessions() -> Generator[ForkedSessions]:
-    with ForkedSessions() as sessions:
-        yield sessions
-
-
 @pytest.fixture
-def forked(_forked_sessions: ForkedSessions, monkeypatch: pytest.MonkeyPatch) -> None:
+def forked(forked_sessions: ForkedSessions, monkeypatch: pytest.MonkeyPatch) -> None:
     """Sessions that a test starts are forked, which saves it the second that a session takes to load the program."""
-    _forked_sessions.use(monkeypatch)
+    if sys.platform != "win32":
+        monkeypatch.setattr("bench.app.ipc.client.subprocess", forking(forked_sessions.link))
