@@ -22,6 +22,8 @@ from sim.loading import BENCH, load_model
 
 load_model(modules=BENCH)
 link = socket.socket(fileno=int(sys.argv[1]))
+# what is installed for the test that began this server is not there for every session
+own = os.environ.get("PYTHONPATH", "").split(os.pathsep)
 
 def ask():
     # the folder and the environment of a session, its standard input and output, and where its end is told
@@ -40,7 +42,7 @@ def session(request, handles):
     os.environ.update(request["environment"])
     os.chdir(request["folder"])
     added = os.environ.get("PYTHONPATH", "")
-    sys.path[:0] = added.split(os.pathsep) if added else []
+    sys.path[:] = [*filter(None, added.split(os.pathsep)), *(each for each in sys.path if each not in own)]
     for handle, target in ((handles[0], 0), (handles[1], 1), (handles[1], 2)):
         os.dup2(handle, target)
     for handle in handles:
