@@ -12,6 +12,7 @@ import tomllib
 from collections.abc import Callable, Iterator
 from contextlib import chdir, contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import dataclass
+from functools import cache
 from io import StringIO
 from pathlib import Path
 from unittest.mock import patch
@@ -58,13 +59,18 @@ def collection() -> Path | None:
 
 def furnish(folder: Path, specimen: str) -> None:
     """Put the files into `folder` that the pages name; `specimen` is the text of a specimen file."""
-    (folder / "campaign.h5").write_bytes(lzma.decompress(CAMPAIGN.read_bytes()))
+    (folder / "campaign.h5").write_bytes(_campaign())
     (folder / "bench.toml").write_text("[simulation]\nseed = 5\n", encoding="utf-8")
     (folder / "better.toml").write_text("[analysis]\nlaser_linearity = 0.0005\n", encoding="utf-8")
     (folder / "specimen.json").write_text(specimen, encoding="utf-8")
     records = collection()
     for name, source in RECORDS.items() if records else ():
         shutil.copy(records / source, folder / name)
+
+
+@cache
+def _campaign() -> bytes:
+    return lzma.decompress(CAMPAIGN.read_bytes())
 
 
 Execute = Callable[[list[str], Path], subprocess.CompletedProcess[str]]

@@ -29,7 +29,7 @@ from sim.specimen import Block
 
 pytestmark = pytest.mark.usefixtures("shared_results")
 STORED = Path("tests/data/first_edition/harmonic_point.h5.xz")
-QUICK = {"omega": 20, "beta": 0.25, "measured_cycles": 8}
+QUICK = {"omega": 20, "beta": 0.25, "starts": 1, "ramp_time": 2, "settle_tolerance": 0.01, "measured_cycles": 8}
 
 
 @pytest.fixture(scope="module")
@@ -244,8 +244,8 @@ def test_samples_are_the_signals_that_the_guard_had(followed: Followed) -> None:
 
 
 def test_a_run_is_that_of_the_command_line(campaign: bench.Campaign, tmp_path: Path) -> None:
-    flags = ["--omega", "20", "--beta", "0.25", "--measured-cycles", "8", "--seed", "3"]
-    assert main(["run", "harmonic", *flags, "--out", str(tmp_path / "run")]) == 0
+    flags = [word for name, value in QUICK.items() for word in (f"--{name.replace('_', '-')}", str(value))]
+    assert main(["run", "harmonic", *flags, "--seed", "3", "--out", str(tmp_path / "run")]) == 0
     with bench.open(tmp_path / "run") as other:
         assert other.points["alpha_2"].values.tolist() == campaign.points["alpha_2"].values.tolist()
         assert other.configuration == campaign.configuration

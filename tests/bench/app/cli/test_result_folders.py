@@ -18,6 +18,7 @@ from datetime import datetime
 from io import StringIO
 from pathlib import Path
 import bench.app.folders as output
+import bench.app.preflight
 import bench.app.session
 from bench.app.cli.main import main
 from bench.app.session import SessionResult
@@ -31,16 +32,18 @@ def start(protocol, configuration, *, out, **_):
         file.write(sys.argv[1])
     return SessionResult("completed", "", {"points": []}, "", False)
 
+bench.app.preflight.load_bench = lambda *_: None
 bench.app.session.run_session = start
 for folder, *arguments in json.loads(sys.argv[2]):
     os.chdir(folder)
     print("ready", flush=True)
     sys.stdin.readline()
     with redirect_stdout(StringIO()), redirect_stderr(StringIO()) as errors:
-        code = main(["run", "harmonic", "--omega", "16", "--yes", *arguments])
+        code = main(["run", "laser-calibration", "--yes", *arguments])
     print(json.dumps([code, errors.getvalue()]), flush=True)
 """
-"""Runs with a clock that stands still and without their bench: what is left is the command and the folder."""
+"""Runs with a clock that stands still and without their bench: what is left is the command and the folder. The
+protocol is one that computes nothing before it begins."""
 
 Together = dict[Path, list[tuple[int, str]]]
 """The code and standard error of each of two runs that were let go in a folder at the same moment."""
@@ -81,7 +84,7 @@ def together(tmp_path_factory: pytest.TempPathFactory) -> Together:
 def test_two_runs_in_the_same_second_have_a_folder_each(together: Together) -> None:
     folder, ended = next(iter(together.items()))
     assert [code for code, _ in ended] == [0, 0]
-    name = "harmonic-2026-01-02T03-04-05"
+    name = "laser-calibration-2026-01-02T03-04-05"
     folders = sorted(path.name for path in (folder / "runs").iterdir())
     assert folders == [name, f"{name}-2"]
     assert {(folder / "runs" / each / "campaign.h5").read_text() for each in folders} == {"first", "second"}
@@ -132,5 +135,5 @@ def test_a_run_that_is_refused_leaves_no_folder(tmp_path: Path, monkeypatch: pyt
     def start(*_: object, **__: object) -> object:
         raise InvalidInput("drift", 0.1, "below the limit")
 
-    assert main_with(start, ["run", "harmonic", "--omega", "16", "--yes"]) == 2  # pyright: ignore[reportArgumentType]
+    assert main_with(start, ["run", "laser-calibration", "--yes"]) == 2  # pyright: ignore[reportArgumentType]
     assert list(tmp_path.iterdir()) == []

@@ -364,7 +364,7 @@ def test_memory_does_not_grow_with_the_run(
     monkeypatch.setattr(format, "ROWS_AT_ONCE", piece)
     monkeypatch.setattr("bench.datafile.checksums.ROWS_AT_ONCE", piece)
     peaks: list[int] = []
-    for number, pieces in enumerate((2, 2, 12)):
+    for number, pieces in enumerate((2, 2, 8)):
         path = tmp_path / f"{number}.h5"
         recorder = Recorder(path, channels=CHANNELS, sample_rate=1e4, point_type=Found, metadata={}, hold_up=60.0)
         for first in range(0, pieces * piece, piece):

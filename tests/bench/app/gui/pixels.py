@@ -1,19 +1,21 @@
 """Texts of the window that are clipped, or covered by another one, on a screen.
 
-    python -m tests.bench.app.gui.pixels WIDTH HEIGHT [THEME [FILES]]
+    python -m tests.bench.app.gui.pixels [--theme THEME] [--files FILES] WIDTHxHEIGHT...
 
-The screen has this size in physical pixels; `QT_SCALE_FACTOR` scales the window. Pictures of the pages are saved under
-names that begin with FILES. With the argument `grid` alone, every size, scale and theme of `SCREENS`, `SCALES` and
-`THEMES` is shown, in one process each.
+The screens have these sizes in physical pixels; `QT_SCALE_FACTOR` scales the window. Pictures of the pages are saved
+under names that begin with FILES. With the argument `grid` alone, every size, scale and theme of `SCREENS`, `SCALES`
+and `THEMES` is shown, in a process for each scale and theme.
 """
 
+import argparse
 import os
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 from PySide6.QtCore import QPoint, QRect
-from PySide6.QtWidgets import QAbstractButton, QApplication, QLabel, QScrollArea, QWidget
+from PySide6.QtWidgets import QAbstractButton, QApplication, QLabel, QScrollArea, QTabWidget, QWidget
 
 from bench.app.catalogue import all_protocols
 from bench.app.display.theme import DARK, LIGHT
@@ -90,8 +92,8 @@ def _scrolls(part: QWidget) -> bool:
     return False
 
 
-def main(width: int, height: int, theme: str) -> int:
-    """Show every page on a screen of this size [px]; prints and counts what is clipped or covered."""
+def show(sizes: Sequence[tuple[int, int]], theme: str, files: str = "") -> int:
+    """Show every page on screens of these sizes [px]; prints and counts what is clipped or covered."""
     os.environ["ROCKBENCH_SESSIONS"] = "off"
     application = QApplication([])
     controller = Controller()
@@ -99,24 +101,27 @@ def main(width: int, height: int, theme: str) -> int:
     # after the window is built, as in the program
     dress(application, THEMES[theme])
     scale = window.devicePixelRatioF()
-    window.resize(max(int(width / scale), SMALLEST[0]), max(int(height / scale) - TITLE_BAR, SMALLEST[1]))
     window.show()
     run = Run("harmonic", HarmonicParameters(omega=(14.0, 16.0), beta=(0.25, 0.4)), BenchConfiguration(), Path("never"))
     controller.began.emit(run)
-    wrong: list[str] = []
-    for number in range(window.pages.count()):
-        window.pages.setCurrentIndex(number)
-        for _ in range(3):
-            application.processEvents()
-        wrong += [f"{window.pages.tabText(number)}: {each}" for each in (*clipped(window), *overlapping(window))]
-        if len(sys.argv) > 4:
-            window.grab().save(f"{sys.argv[4]}-{width}-{scale:g}-{theme}-{number}.png")
-    window.results.show_run()
-    for part in range(window.results.parts.count()):
-        window.results.parts.setCurrentIndex(part)
-        for _ in range(3):
-            application.processEvents()
-        wrong += [f"{window.results.parts.tabText(part)}: {each}" for each in (*clipped(window), *overlapping(window))]
+    results, wrong = window.results, list[str]()
+
+    def look(tabs: QTabWidget) -> None:
+        for number in range(tabs.count()):
+            tabs.setCurrentIndex(number)
+            for _ in range(3):
+                application.processEvents()
+            where = f"{width}x{height}, {tabs.tabText(number)}"
+            wrong.extend(f"{where}: {each}" for each in (*clipped(window), *overlapping(window)))
+            if files and tabs is window.pages:
+                window.grab().save(f"{files}-{width}-{scale:g}-{theme}-{number}.png")
+
+    for width, height in sizes:
+        window.resize(max(int(width / scale), SMALLEST[0]), max(int(height / scale) - TITLE_BAR, SMALLEST[1]))
+        results.views.setCurrentWidget(results.browser)
+        look(window.pages)
+        results.show_run()
+        look(results.parts)
     print("\n".join(wrong))
     window.leave()
     return len(wrong)
@@ -125,18 +130,29 @@ def main(width: int, height: int, theme: str) -> int:
 def grid() -> int:
     """Every screen, scale and theme."""
     wrong = 0
-    for width, height in SCREENS:
-        for scale in SCALES:
-            for theme in THEMES:
-                command = [sys.executable, "-m", "tests.bench.app.gui.pixels", str(width), str(height), theme]
-                environment = {"QT_QPA_PLATFORM": "offscreen", **os.environ, "QT_SCALE_FACTOR": scale}
-                done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
-                wrong += done.returncode != 0
-                print(f"{width}x{height}, scale {scale}, {theme}: {done.stdout.strip() or 'whole'}", flush=True)
+    for scale in SCALES:
+        for theme in THEMES:
+            sizes = [f"{width}x{height}" for width, height in SCREENS]
+            command = [sys.executable, "-m", "tests.bench.app.gui.pixels", "--theme", theme, *sizes]
+            environment = {"QT_QPA_PLATFORM": "offscreen", **os.environ, "QT_SCALE_FACTOR": scale}
+            done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+            wrong += done.returncode != 0
+            print(f"scale {scale}, {theme}: {done.stdout.strip() or 'whole'}", flush=True)
     return wrong
 
 
+def main() -> int:
+    """The command line."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("screens", nargs="+")
+    parser.add_argument("--theme", choices=THEMES, default="light")
+    parser.add_argument("--files", default="")
+    asked = parser.parse_args()
+    if asked.screens == ["grid"]:
+        return min(grid(), 1)
+    sizes = [(int(width), int(height)) for width, height in (each.split("x") for each in asked.screens)]
+    return min(show(sizes, asked.theme, asked.files), 1)
+
+
 if __name__ == "__main__":
-    if sys.argv[1:] == ["grid"]:
-        sys.exit(min(grid(), 1))
-    sys.exit(min(main(int(sys.argv[1]), int(sys.argv[2]), sys.argv[3] if len(sys.argv) > 3 else "light"), 1))
+    sys.exit(main())

@@ -78,9 +78,13 @@ def delete_closed() -> None:
 @contextmanager
 def undressed() -> Generator[None]:
     """Within, windows are built without a theme, as by the program: with one, every insertion of a widget would style
-    its children again.
+    its children again. Beside another window, which takes longer to undress and to dress than a new one takes to be
+    built in its theme, the theme stays.
     """
     running = application()
+    if any(each.isVisible() for each in running.topLevelWidgets()):
+        yield
+        return
     running.setStyleSheet("")
     try:
         yield

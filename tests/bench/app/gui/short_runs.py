@@ -41,6 +41,7 @@ PARAMETERS: dict[str, Parameters] = {
         omega=(20.0,),
         beta=(0.25,),
         measured_cycles=4,
+        starts=1,
         ramp_time=2.0,
         settle_tolerance=0.02,
         amplitude_tolerance=0.02,

@@ -25,6 +25,7 @@ from bench.engine.interface import Requests
 from bench.events import StepStarted
 from tests.bench.app.gui.shared_window import undressed
 from tests.bench.app.ipc.experiment import SHAKING, bench, order
+from tests.forked_sessions import ForkedSessions
 from tests.patience import LONG_MS
 
 ROOT = Path(__file__).parents[4]
@@ -33,14 +34,19 @@ pytestmark = pytest.mark.skipif(os.name != "posix", reason="kills a process the 
 
 
 @pytest.fixture
-def session(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Generator[subprocess.Popen[str]]:
+def session(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, forked_sessions: ForkedSessions
+) -> Generator[subprocess.Popen[str]]:
     """A window's process that is killed while its run, which goes on without it, drives the table."""
     monkeypatch.setenv("ROCKBENCH_SESSIONS", str(tmp_path / "sessions"))
     # in another working folder than the window's, with a relative folder for its results, as on a command line
-    command = [sys.executable, "-m", "tests.bench.app.ipc.lone_client", "run", "go on", "400"]
+    link = forked_sessions.link.fileno()
+    command = [sys.executable, "-m", "tests.bench.app.ipc.lone_client", "run", "go on", "400", str(link)]
     paths = os.pathsep.join(filter(None, (str(ROOT), os.environ.get("PYTHONPATH"))))
     environment = os.environ | {"PYTHONPATH": paths}
-    with subprocess.Popen(command, cwd=tmp_path, env=environment, stdout=subprocess.PIPE, text=True) as client:
+    with subprocess.Popen(
+        command, cwd=tmp_path, env=environment, stdout=subprocess.PIPE, text=True, pass_fds=[link]
+    ) as client:
         assert client.stdout is not None
         while client.stdout.readline().strip() != "running":
             assert client.poll() is None

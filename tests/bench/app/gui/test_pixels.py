@@ -15,12 +15,12 @@ ROOT = Path(__file__).parents[4]
 
 
 @pytest.mark.parametrize(
-    ("width", "height", "scale", "theme"),
-    [(1024, 600, "2", "light"), (1366, 768, "1.5", "dark"), (3840, 2160, "2", "light")],
+    ("scale", "theme", "screens"),
+    [("2", "light", ["1024x600", "3840x2160"]), ("1.5", "dark", ["1366x768"])],
 )
-def test_nothing_is_clipped(width: int, height: int, scale: str, theme: str) -> None:
-    """In a process of its own, because Qt reads the scale factor once."""
-    command = [sys.executable, "-m", "tests.bench.app.gui.pixels", str(width), str(height), theme]
+def test_nothing_is_clipped(scale: str, theme: str, screens: list[str]) -> None:
+    """In a process for each scale factor, because Qt reads it once."""
+    command = [sys.executable, "-m", "tests.bench.app.gui.pixels", "--theme", theme, *screens]
     environment = {"QT_QPA_PLATFORM": "offscreen", **os.environ, "QT_SCALE_FACTOR": scale}
     done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout.strip()) == (0, ""), done.stderr

@@ -14,8 +14,8 @@ from bench.app.display.theme import LIGHT
 from bench.app.formatting import measurement
 from bench.app.gui.controller import Controller
 from bench.app.gui.window import Window
-from bench.config.model import BenchConfiguration
 from tests.bench.app.gui.shared_window import PROTOCOLS, undressed
+from tests.bench.app.ipc.experiment import bench
 from tests.installed import example
 from tests.patience import LONG_MS
 
@@ -26,7 +26,8 @@ def window(qtbot: QtBot, tmp_path: Path) -> Generator[Window]:
     with example(tmp_path / "site", "tone_sweep"):
         entries = (*PROTOCOLS, load_protocol("tone-sweep"))
         with undressed():
-            shown = Window(Controller(), BenchConfiguration(), entries, LIGHT)
+            # the small bench rests soon and ramps fast
+            shown = Window(Controller(), bench(), entries, LIGHT)
         qtbot.addWidget(shown)
         shown.show()
         yield shown

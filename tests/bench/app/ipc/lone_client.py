@@ -1,15 +1,20 @@
-"""A client that starts a run and looks after it: `python -m tests.bench.app.ipc.lone_client FOLDER [go on [CYCLES]]`.
+"""A client that starts a run and looks after it:
+`python -m tests.bench.app.ipc.lone_client FOLDER [go on [CYCLES [LINK]]]`.
 
-It prints the process of the session and every state of the bench; a test then kills or freezes it.
+It prints the process of the session and every state of the bench; a test then kills or freezes it. LINK is the number
+of a socket at whose other end the session is forked.
 """
 
+import socket
 import sys
 import time
 from pathlib import Path
 
+from bench.app.ipc import client
 from bench.app.ipc.messages import BEAT, Ended, Published, Refused
 from bench.events import StateChanged
 from tests.bench.app.ipc.experiment import begun
+from tests.forked_sessions import forking
 
 
 def main(out: Path, *, keep_going: bool, cycles: int) -> None:
@@ -29,4 +34,6 @@ def main(out: Path, *, keep_going: bool, cycles: int) -> None:
 
 if __name__ == "__main__":
     folder, *options = sys.argv[1:]
+    if len(options) > 2:
+        client.subprocess = forking(socket.socket(fileno=int(options[2])))  # pyright: ignore[reportAttributeAccessIssue]
     main(Path(folder), keep_going=bool(options), cycles=int(options[1]) if len(options) > 1 else 12 if options else 400)

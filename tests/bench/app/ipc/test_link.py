@@ -169,6 +169,7 @@ def test_a_plan_check_opens_nothing_calls_whoever_waits_and_leaves_no_thread(tmp
     eventually(lambda: not set(threading.enumerate()) - before)
 
 
+@pytest.mark.usefixtures("forked")
 @pytest.mark.seconds
 @pytest.mark.skipif(sys.platform == "win32", reason="no signal ends a wait there")
 @pytest.mark.parametrize(
@@ -190,6 +191,7 @@ def test_an_end_that_is_asked_for_breaks_the_planning_off(
     assert took < 4.0
 
 
+@pytest.mark.usefixtures("forked")
 def test_what_is_refused_names_its_item(tmp_path: Path) -> None:
     client = Client(begun(tmp_path / "run", amplitude=1.95))
     refused = client.until_over()
@@ -198,6 +200,7 @@ def test_what_is_refused_names_its_item(tmp_path: Path) -> None:
     assert not (tmp_path / "run").exists()
 
 
+@pytest.mark.usefixtures("forked")
 def test_an_abort_can_be_asked_for_and_beats_tell_the_state(tmp_path: Path) -> None:
     client = Client(begun(tmp_path, gossip=50))
     client.until(lambda: any(isinstance(m, Beat) and m.state is State.RUNNING for m in client.heard))
@@ -207,6 +210,7 @@ def test_an_abort_can_be_asked_for_and_beats_tell_the_state(tmp_path: Path) -> N
     assert (ended.status, ended.reason) == ("aborted", "abort requested")
 
 
+@pytest.mark.usefixtures("forked")
 def test_a_run_that_has_ended_is_not_refused_when_its_figures_are_broken_off(tmp_path: Path) -> None:
     client = Client(begun(tmp_path, cycles=1, drawing=LONG))
     client.until(lambda: any(isinstance(m, Preparing) and m.phase == "drawing the figures" for m in client.heard))
@@ -217,6 +221,7 @@ def test_a_run_that_has_ended_is_not_refused_when_its_figures_are_broken_off(tmp
     assert not (tmp_path / "none.png").exists()
 
 
+@pytest.mark.usefixtures("forked")
 def test_a_question_takes_only_its_own_answer(tmp_path: Path) -> None:
     client = Client(begun(tmp_path, person=True))
     client.until(client.question)
@@ -230,6 +235,7 @@ def test_a_question_takes_only_its_own_answer(tmp_path: Path) -> None:
     assert (ended.status, ended.reason) == ("aborted", "the operator declined: Take the block off the table.")
 
 
+@pytest.mark.usefixtures("forked")
 def test_a_client_that_is_closed_at_a_question_ends_the_run(tmp_path: Path) -> None:
     client = Client(begun(tmp_path, person=True))
     client.until(client.question)
@@ -240,6 +246,7 @@ def test_a_client_that_is_closed_at_a_question_ends_the_run(tmp_path: Path) -> N
     assert ended.reason.startswith("the client was closed")
 
 
+@pytest.mark.usefixtures("forked")
 @pytest.mark.seconds
 def test_a_session_that_dies_is_noticed_within_a_second(tmp_path: Path) -> None:
     client = Client(begun(tmp_path))
@@ -253,6 +260,7 @@ def test_a_session_that_dies_is_noticed_within_a_second(tmp_path: Path) -> None:
     assert "ended without a message" in refused.text
 
 
+@pytest.mark.usefixtures("forked")
 @pytest.mark.seconds
 def test_halt_is_quick_while_thousands_of_events_are_told(tmp_path: Path) -> None:
     client = Client(begun(tmp_path, gossip=2000))

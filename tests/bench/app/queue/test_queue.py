@@ -243,7 +243,8 @@ def test_what_waits_goes_on_waiting_after_a_test_that_did_not_end_well(
     outcome: str,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    _write({"protocol": "harmonic", "stage": "skipped"}, {"protocol": "harmonic"}, {"protocol": "harmonic"})
+    test = {"protocol": "laser-calibration"}
+    _write({**test, "stage": "skipped"}, test, test)
     session.status = status
     if during is not None:
         session.during = during
@@ -284,7 +285,7 @@ def test_tests_that_fit_one_by_one_must_fit_together(
 ) -> None:
     big = Preflight(Forecast(duration=60.0), (), DiskSpace(Path(), 600_000_000, 1_000_000_000), "hash")
     monkeypatch.setattr("bench.app.preflight.compile_run", lambda *_asked: big)
-    _write({"protocol": "harmonic"}, {"protocol": "harmonic"})
+    _write({"protocol": "laser-calibration"}, {"protocol": "laser-calibration"})
     assert _queue(session) == 2
     assert "may need 1.20 GB, but 1.00 GB are free" in capsys.readouterr().err
 
@@ -310,7 +311,7 @@ def test_a_dry_run_tells_of_every_plan_and_runs_none(
 def test_a_queue_has_one_owner_and_none_when_that_one_dies(
     session: FakeSession, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    _write({"protocol": "harmonic"})
+    _write({"protocol": "laser-calibration"})
     before = Path("queue.json").read_bytes()
     program = (
         "import sys, time; from pathlib import Path; from bench.app.queue.file import Owner\n"
@@ -364,7 +365,7 @@ def test_the_lock_is_released_once_and_by_any_thread(tmp_path: Path) -> None:
 
 
 def test_while_a_queue_runs_nothing_is_added_to_it(session: FakeSession, capsys: pytest.CaptureFixture[str]) -> None:
-    _write({"protocol": "harmonic"})
+    _write({"protocol": "laser-calibration"})
     codes: list[int] = []
     session.during = lambda _requests: codes.append(main(["run", "harmonic", "--queue", "queue.json"]))
     assert _queue(session) == 0
@@ -381,7 +382,7 @@ def test_a_file_that_is_not_there_is_refused(session: FakeSession, capsys: pytes
 def test_a_test_that_has_run_is_told_even_if_the_file_was_changed_meanwhile(
     session: FakeSession, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    _write({"protocol": "harmonic"}, {"protocol": "harmonic"})
+    _write({"protocol": "laser-calibration"}, {"protocol": "laser-calibration"})
 
     def save(_requests: Requests) -> None:
         path = Path("queue.json")

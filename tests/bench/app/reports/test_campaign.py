@@ -20,7 +20,7 @@ from bench.document.document import Document, Picture, Section, Table
 from protocols.harmonic.report_cycles import PERIODS, SAMPLES, Dwells
 from sim.gain import predict_gain
 
-SHORT = ["--omega", "20", "--beta", "0.25", "--ramp-time", "2", "--measured-cycles", "8"]
+SHORT = ["--omega", "20", "--beta", "0.25", "--starts", "1", "--ramp-time", "2", "--measured-cycles", "8"]
 LOOSE = ["--settle-tolerance", "0.01", "--amplitude-tolerance", "0.01"]
 
 
@@ -114,7 +114,7 @@ def test_the_results_are_those_of_the_summary_with_their_uncertainties(document:
     assert {row[1] for row in sources.rows} == {"A", "B"}
     correlations = json.loads(point["uncertainty_correlations"])
     assert {row[0]: row[4] for row in sources.rows if row[4] != "–"} == {
-        name: f"{value:.2f}" for name, value in correlations.items()
+        name: f"{value:.2f}".replace("-", "−") for name, value in correlations.items()
     }
     (improvement,) = (part for part in section(document, "results").parts if "largest contribution" in str(part))
     assert point["dominating"] in str(improvement)
