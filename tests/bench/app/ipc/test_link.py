@@ -145,14 +145,21 @@ def test_traces_enclose_the_recorded_samples(linked: Linked) -> None:
     traces = [message for message in client.heard if isinstance(message, Traces)]
     assert len(traces) > 10
     with open_datafile(file) as record:
-        recorded = record.drive()
-    low, high = (np.concatenate([getattr(each, side)[:, 0] for each in traces]) for side in ("low", "high"))
-    # two samples a bin at 1000 samples/s, none lost in this short run
-    assert len(low) == len(recorded) // 2
-    np.testing.assert_allclose(low, recorded.reshape(-1, 2).min(axis=1), atol=1e-6)
-    np.testing.assert_allclose(high, recorded.reshape(-1, 2).max(axis=1), atol=1e-6)
-    rows = np.diff([each.begin for each in traces if each.run == traces[0].run])
-    np.testing.assert_allclose(rows, 0.05, atol=1e-9)
+        recorded, times = record.drive(), record.time()
+    for each in traces:
+        # two samples a bin at 1000 samples/s
+        first = int(np.searchsorted(times, each.begin - 1e-4))
+        shown = recorded[first : first + 2 * len(each.low)].reshape(-1, 2)
+        np.testing.assert_allclose(each.low[:, 0], shown.min(axis=1), atol=1e-6)
+        np.testing.assert_allclose(each.high[:, 0], shown.max(axis=1), atol=1e-6)
+    # a client that does not keep up misses whole blocks, and is told how many
+    missed = len(recorded) // 2 - sum(len(each.low) for each in traces)
+    told = max(message.lost_traces for message in client.heard if isinstance(message, Beat))
+    assert missed % len(traces[0].low) == 0
+    assert told <= missed // len(traces[0].low)
+    rows = np.diff([each.begin for each in traces if each.run == traces[0].run]) / 0.05
+    np.testing.assert_allclose(rows, np.rint(rows), atol=1e-6)
+    assert rows.min() > 0.5
 
 
 def test_a_plan_check_opens_nothing_calls_whoever_waits_and_leaves_no_thread(tmp_path: Path) -> None:
