@@ -70,10 +70,10 @@ class ErrorCurve:
     """Error curve of one laser relative to the measured table displacement: Chebyshev coefficients `error` [m] over the
     readings from `low` to `high` [m], and `delay` [s].
 
-    `scores` [m], shape (orders,), are the rms prediction errors of the orders from 1 on. `beyond` [m] is the rms
-    contribution of higher orders, or of the highest one if this is chosen, and `residual` [m] that without their
-    scatter. `without` [m], shape (passes, READINGS), are the curves, and `delays` [s], shape (passes,), the delays,
-    fitted without each pass in turn.
+    `scores` [m], shape (orders,), are the rms prediction errors of the orders from 1 on. `residual` [m] is the rms
+    contribution of higher orders, or of the highest one if this is chosen, without their scatter. `without` [m], shape
+    (passes, READINGS), are the curves, and `delays` [s], shape (passes,), the delays, fitted without each pass in turn;
+    `finest` [m], shape (passes, orders + 1), are the coefficients of such curves of the highest order.
     """
 
     low: float
@@ -81,9 +81,9 @@ class ErrorCurve:
     error: Array
     delay: float
     scores: Array
-    beyond: float
     residual: float
     without: Array
+    finest: Array
     delays: Array
 
     @property
@@ -99,9 +99,9 @@ class ErrorCurve:
 
     @property
     def slopes(self) -> Array:
-        """Slopes of the curves fitted without each pass in turn, shape (passes,)."""
-        spans: Array = self.without[:, -1] - self.without[:, 0]
-        return spans / (self.high - self.low)
+        """Slopes of the curves of the highest order fitted without each pass in turn, shape (passes,)."""
+        # polynomials of even order are equal at both ends
+        return 2.0 * self.finest[:, 1::2].sum(axis=1) / (self.high - self.low)
 
 
 def mean_pass(cycles: Sequence[Cycle], omega: float) -> Pass:
@@ -139,9 +139,9 @@ def fit_curve(passes: Sequence[Pass], laser: int, rest: float) -> ErrorCurve:
         error=fit.whole[:-2],
         delay=float(fit.whole[-2]),
         scores=fit.scores,
-        beyond=fit.beyond,
         residual=fit.residual,
         without=(chebyshev.chebvander(PLACES, fit.order) @ fit.without[:, :-2].T).T.astype(np.float64),
+        finest=fit.finest[:, :-2],
         delays=fit.without[:, -2],
     )
 

@@ -29,7 +29,8 @@ class PolynomialFit:
 
     `scores`, shape (orders,), are the rms prediction errors of the orders from 1 on; `beyond` is the rms contribution
     of higher orders, or of the highest one if this is chosen, and `scatter` that of it which the jackknife explains.
-    `solved` fits some of the passes with the same order.
+    `finest`, shape (passes, highest + 3), is `without` for the highest order; `solved` fits some of the passes with the
+    chosen one.
     """
 
     order: int
@@ -38,6 +39,7 @@ class PolynomialFit:
     scores: Array
     beyond: float
     scatter: float
+    finest: Array
     solved: Callable[[Sequence[int]], Array]
 
     @property
@@ -86,6 +88,7 @@ def fit_polynomial(rows: Sequence[Array]) -> PolynomialFit:
         scores=np.sqrt(means),
         beyond=float(np.std(beyond(every))),
         scatter=scatter(np.array([beyond(others(out)) for out in every])),
+        finest=np.array([solved(highest, others(out)) for out in every]),
         solved=lambda kept: solved(order, kept),
     )
 

@@ -87,11 +87,13 @@ def fit_reference(passes: Sequence[Pass], linearity: float) -> ReferenceCurve:
     fastest = max(each.omega for each in passes)
     fit = fit_polynomial([_rows(each, low, high, highest, (each.omega / fastest) ** 2) for each in passes])
     without = _curves(fit.without)
+    # a straight line has no scatter that would stand for what is not seen
+    missing = fit.residual if fit.order > 1 else fit.beyond
     return ReferenceCurve(
         low=low,
         high=high,
         error=_pinned(fit.whole),
-        uncertainty=sqrt(scatter(without) ** 2 + fit.residual**2 + _excess(fit, _by_frequency(passes))),
+        uncertainty=sqrt(scatter(without) ** 2 + missing**2 + _excess(fit, _by_frequency(passes))),
         limit=linearity * (high - low),
         scores=fit.scores,
         without=without,

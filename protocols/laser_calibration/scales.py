@@ -65,20 +65,19 @@ def calibration(
         )
         for curve, rest, device, slope in zip(curves, rests, devices, slopes, strict=True)
     ]
-    span = _span(curves)
+    span = min(curve.high - curve.low for curve in curves)
     # two lasers that disagree by more than they should leave half of the excess to their mean; since one of them must
     # have a fault that nobody has found, the accelerometer does not reduce it
     excess = 0.5 * sqrt(max((slopes[1] - slopes[0]) ** 2 - (COVERAGE * standard.apart) ** 2, 0.0))
-    # an error due to higher orders at both ends, as large as at any reading; their scatter is included, since the
-    # jackknife explains less of it at the ends
-    bent = sqrt(2.0) * np.hypot(curves[0].beyond, curves[1].beyond) / span
+    # an error due to missing orders at both ends, as large as at any reading
+    bent = sqrt(2.0) * hypot(curves[0].residual, curves[1].residual) / span
     return LaserCalibration(
         date=date,
         valid_days=valid_days,
         laser_1=found[0],
         laser_2=found[1],
         differential_scale=found[1].scale / found[0].scale,
-        differential_uncertainty=float(np.hypot(jackknife(curves[1].slopes - curves[0].slopes), bent)),
+        differential_uncertainty=hypot(jackknife(curves[1].slopes - curves[0].slopes), bent),
         common_linearity=common_linearity,
         table_displacement=factor,
         table_acceleration=factor * float(ratios.mean()),
@@ -142,11 +141,6 @@ def disagreements(
             "check the sensor, and whether the table tilts as it moves, which an accelerometer measures as well"
         )
     return remarks
-
-
-def _span(curves: tuple[ErrorCurve, ErrorCurve]) -> float:
-    """Span of the readings that both lasers cover [m]."""
-    return min(curve.high - curve.low for curve in curves)
 
 
 def _rescaled(curve: ErrorCurve, factor: float) -> Array:

@@ -77,6 +77,13 @@ def test_the_uncertainty_is_the_error_of_repetition() -> None:
     assert 0.7 < np.sqrt(np.mean(np.square(ratios))) < 1.3
 
 
+def test_a_sensor_without_an_error_is_known_as_well_as_the_noise_allows() -> None:
+    for seed in range(4):
+        curve = fit_reference(made(np.zeros_like, noise=1e-3, seed=seed), LINEARITY)
+        assert missed(curve, np.zeros_like) < 2.0 * curve.uncertainty
+        assert 1e-8 < curve.uncertainty < 1e-6
+
+
 def test_a_table_that_tilts_widens_the_uncertainty() -> None:
     """50 urad of tilt are more than a wavy guide has, and 5 mrad those of one that is loose."""
     for size, corrects in ((50e-6, True), (5e-3, False)):

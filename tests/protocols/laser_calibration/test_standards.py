@@ -21,9 +21,9 @@ def curve(error: np.ndarray, rest: float) -> ErrorCurve:
         error=error,
         delay=0.0,
         scores=np.full(12, 1e-6),
-        beyond=5e-7,
         residual=5e-7,
         without=np.zeros((8, 3)),
+        finest=np.zeros((8, 13)),
         delays=np.zeros(8),
     )
 
