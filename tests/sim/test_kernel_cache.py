@@ -368,10 +368,11 @@ def test_old_folders_go_but_none_that_a_process_uses(installation: Installation)
     assert not held.exists()
 
 
-def test_processes_that_start_and_clear_up_together_all_get_a_folder(installation: Installation) -> None:
+@pytest.mark.parametrize("times", [40, pytest.param(400, marks=pytest.mark.soak)])
+def test_processes_that_start_and_clear_up_together_all_get_a_folder(times: int, installation: Installation) -> None:
     code = (
         "import sys\nfrom sim.kernel.cache import KernelCache\n"
-        "for i in range(150):\n"
+        f"for i in range({times}):\n"
         "    k = KernelCache('', [i * 7 % 10]); f = k.folder()\n"
         "    assert f is not None and f.is_dir() and (f / 'in-use').exists()\n"
         "    k.release()\n"
