@@ -63,9 +63,9 @@ class ReferenceCurve:
     @property
     def plausible(self) -> bool:
         """Whether the error is within the data sheet: an error within its limits differs from the straight line through
-        its ends by less than twice the limit.
+        its ends by less than twice the limit. Without a limit, the sensor is taken to be linear.
         """
-        return self.largest <= 2.0 * (self.limit + self.remaining)
+        return self.limit == 0.0 or self.largest <= 2.0 * (self.limit + self.remaining)
 
     def corrected(self, passes: Sequence[Pass]) -> list[Pass]:
         """The passes with corrected displacements; unchanged if the data sheet states a smaller error."""

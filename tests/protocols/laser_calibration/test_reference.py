@@ -96,6 +96,13 @@ def test_a_table_that_tilts_widens_the_uncertainty() -> None:
             assert curve.remaining == pytest.approx(LINEARITY * (curve.high - curve.low))
 
 
+def test_a_sensor_that_is_taken_to_be_linear_is_neither_corrected_nor_doubted() -> None:
+    passes = made(bent(1.5))
+    curve = fit_reference(passes, 0.0)
+    assert (curve.corrects, curve.remaining, curve.plausible) == (False, 0.0, True)
+    assert curve.corrected(passes) == passes
+
+
 def test_an_error_beyond_the_data_sheet_is_not_plausible() -> None:
     assert not fit_reference(made(lambda x: 5.0 * bent(1.5)(x), noise=1e-4), LINEARITY).plausible
 
