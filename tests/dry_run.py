@@ -19,7 +19,7 @@ from tests.emulated import emulated
 
 SHORT = (
     *("--omega", "20", "--beta", "0.25", "--ramp-time", "2", "--measured-cycles", "8"),
-    *("--settle-tolerance", "0.01", "--amplitude-tolerance", "0.01", "--distortion-tolerance", "0.05"),
+    *("--settle-tolerance", "0.02", "--amplitude-tolerance", "0.02", "--distortion-tolerance", "0.05"),
 )
 """The point that takes least time on the bench."""
 
