@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from bench.analysis.cycles import Cycle, mean_waves
 from bench.analysis.signals import ACCELERATION, DISPLACEMENT, LASER_1, LASER_2
-from protocols.laser_calibration.polynomial import PLACES, fit_polynomial, scatter
+from protocols.laser_calibration.polynomial import fit_polynomial, scatter, values
 
 Array = NDArray[np.float64]
 
@@ -140,7 +140,7 @@ def fit_curve(passes: Sequence[Pass], laser: int, rest: float) -> ErrorCurve:
         delay=float(fit.whole[-2]),
         scores=fit.scores,
         residual=fit.residual,
-        without=(chebyshev.chebvander(PLACES, fit.order) @ fit.without[:, :-2].T).T.astype(np.float64),
+        without=np.array([values(each[:-2]) for each in fit.without]),
         finest=fit.finest[:, :-2],
         delays=fit.without[:, -2],
     )

@@ -27,7 +27,7 @@ from drivers.rig import OperatorTask
 from protocols.common.calibrate import STOREYS_CLAMPED
 from protocols.laser_calibration.curves import ErrorCurve
 from protocols.laser_calibration.plan import START, expected_duration, measure, planned_passes
-from protocols.laser_calibration.polynomial import PLACES
+from protocols.laser_calibration.polynomial import READINGS, values
 from protocols.laser_calibration.protocol import CalibratedSensor, LaserCalibrationParameters
 from protocols.laser_calibration.reference import ReferenceCurve
 from protocols.laser_calibration.scales import disagreements
@@ -173,8 +173,7 @@ class LaserCalibrationRun(Prepared[LaserCalibrationParameters]):
 
 
 def _fit_event(name: str, curve: ErrorCurve, delay: float, uncertainty: float) -> FitFinished:
-    at = np.linspace(curve.low, curve.high, curve.without.shape[1])
-    fit = np.polynomial.chebyshev.chebval(np.linspace(-1.0, 1.0, at.size), curve.error)
+    at, fit = np.linspace(curve.low, curve.high, READINGS), values(curve.error)
     passes = {
         f"without_{number}": Series(each - each.mean(), "m", f"curve fitted without pass {number}")
         for number, each in enumerate(curve.without, 1)
@@ -255,10 +254,10 @@ def _errors_figure(curves: tuple[ErrorCurve, ErrorCurve] | None, reference: Refe
         orders.xaxis.get_major_locator().set_params(integer=True)
         set_grid(orders)
     for (over, orders), curve in zip(panels, (*(curves or ()), *filter(None, [reference])), strict=False):
-        reading = 1e3 * np.linspace(curve.low, curve.high, PLACES.size)
+        reading = 1e3 * np.linspace(curve.low, curve.high, READINGS)
         for each in curve.without:
             over.plot(reading, 1e6 * (each - each.mean()), color=GREY, linewidth=0.6)
-        error = np.polynomial.chebyshev.chebval(PLACES, curve.error)
+        error = values(curve.error)
         over.plot(reading, 1e6 * (error - error.mean()), color=BLUE)
         tried = np.arange(1, curve.scores.size + 1)
         orders.semilogy(tried, 1e6 * curve.scores, "o-", color=BLACK, markersize=4)

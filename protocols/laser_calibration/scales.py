@@ -10,7 +10,6 @@ from datetime import datetime
 from math import hypot, sqrt
 
 import numpy as np
-from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
 from bench.analysis.laser_calibration import LaserCalibration, LaserCurve
@@ -19,7 +18,7 @@ from bench.analysis.uncertainty import COVERAGE
 from bench.config.model import BenchConfiguration
 from protocols.common.calibrate import Unmeasurable
 from protocols.laser_calibration.curves import ErrorCurve, Pass
-from protocols.laser_calibration.polynomial import PLACES, jackknife
+from protocols.laser_calibration.polynomial import jackknife, values
 from protocols.laser_calibration.reference import ReferenceCurve
 from protocols.laser_calibration.standards import IMPLAUSIBLE, standards
 
@@ -128,7 +127,7 @@ def disagreements(
     limits = [configuration.analysis.laser_linearity * whole for whole in configuration.laser_ranges]
     for number, (curve, limit) in enumerate(zip(curves, limits, strict=True), 1):
         # a curve within the limits differs from its straight line by less than twice the limit
-        bent = float(np.abs(chebyshev.chebval(PLACES, [0.0, 0.0, *curve.error[2:]])).max())
+        bent = float(np.abs(values(np.append([0.0, 0.0], curve.error[2:]))).max())
         if bent > (most := 2.0 * limit + found.common_linearity):
             remarks.append(
                 f"the linearity error of laser_{number} is {1e6 * bent:.0f} um, more than the data sheets allow "
