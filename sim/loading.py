@@ -17,16 +17,16 @@ from typing import IO
 
 from sim.waiting import end, join, wait
 
-STEADY = {"steps": 3, "roots": 6, "watching": 8, "members": 27}
+STEADY = {"steps": 3, "roots": 5, "watching": 7, "members": 26}
 """Modules of `sim.kernel` used by predictions of steady motions, with their shares of the compilation time."""
 
-MODEL = {**STEADY, "resting": 14, "rocking": 20}
+MODEL = {**STEADY, "resting": 12, "rocking": 20}
 """Modules used by every prediction."""
 
-RECORDS = {**MODEL, "members_at_rest": 10}
+RECORDS = {**MODEL, "members_at_rest": 14}
 """Modules used by predictions of many runs under a record."""
 
-BENCH = {**STEADY, "laser": 3, "filter": 2, "instruments": 3, "resting": 14, "plant": 8, "table": 15, "rocking": 20}
+BENCH = {**STEADY, "laser": 2, "filter": 4, "instruments": 4, "resting": 12, "plant": 4, "table": 12, "rocking": 20}
 """Modules used by a simulated bench; those of the instruments come first, since this process compiles them while the
 helper compiles the others.
 """
@@ -56,7 +56,7 @@ def load_model(
     apart = [name for name in APART if name in missing] if compiled.cache_folder() is not None else []
     phase, done, total = "loading the model", 0, sum(modules.values())
     if missing:
-        phase = "compiling the model, once per installation, about 10 s"
+        phase = "compiling the model, once per installation, about 8 s"
     with helped(apart) as ready:
         for name, share in modules.items():
             report(phase, done, total)

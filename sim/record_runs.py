@@ -23,14 +23,11 @@ class RecordRuns:
     """
 
     def __init__(self, samples: int, dt: float) -> None:
-        from sim.kernel import rocking as kernel
-
         if samples < 2 or not dt > 0.0:
             raise InvalidInput("record", (samples, dt), "it must have at least two samples and a positive time step")
         self._segments = np.zeros((min(samples - 1, BLOCK), ROW))
         self._segments[:, 0] = dt
         self._count, self._dt = samples - 1, dt
-        self._memory = np.zeros((kernel.MEMORY_ROWS, 6))
         self._times, self._samples = np.empty(0), np.empty((0, 6))
 
     def run(
@@ -51,9 +48,8 @@ class RecordRuns:
         if acceleration.shape != (self._count + 1,) or not np.isfinite(acceleration.sum()):
             raise InvalidInput("record", acceleration.shape, f"it must have {self._count + 1} finite samples")
         slopes = np.diff(acceleration) / self._dt
-        p, x, report, memory = specimen.packed(), np.zeros(6), np.zeros(kernel.REPORT), self._memory
-        memory[:] = 0.0
-        memory[0, kernel.LENGTH] = self._dt
+        p, x, report, order = specimen.packed(), np.zeros(6), np.zeros(kernel.REPORT), series_order(tolerance, self._dt)
+        memory = kernel.memory_of(order, self._dt)
         for first in range(0, self._count, BLOCK):
             part = slice(first, min(first + BLOCK, self._count))
             segments = self._segments[: part.stop - first]
@@ -66,7 +62,7 @@ class RecordRuns:
                 self._times,
                 0,
                 self._samples,
-                series_order(tolerance, self._dt),
+                order,
                 tolerance,
                 np.inf,
                 overturning_angle,

@@ -240,14 +240,12 @@ class RockingRun:
 
         times = checked_times(self.sample_times, self.drive.duration)
         x, samples = self.state.as_array(), np.empty((times.size, 6))
-        report, memory = np.zeros(kernel.REPORT), np.zeros((kernel.MEMORY_ROWS, 6))
-        memory[0, kernel.LENGTH] = self.drive.segments[0, 0]
-        kernel.advance(
+        report = np.empty(kernel.REPORT)
+        kernel.run(
             self.specimen.packed(),
             self.drive.segments,
             x,
             times,
-            0,
             samples,
             self.order,
             self.tolerance,
@@ -256,7 +254,6 @@ class RockingRun:
             REST_ANGLE,
             np.inf if self.peaks_from is None else self.peaks_from,
             MOST_IMPACTS,
-            memory,
             report,
         )
         return motion_of(report, x, None if self.sample_times is None else samples, watched=self.peaks_from is not None)

@@ -70,8 +70,7 @@ class Stream:
         self._watched = peaks_from is not None
         self._peaks_from = np.inf if peaks_from is None else peaks_from
         self._report = np.zeros(kernel.REPORT)
-        self._memory = np.zeros((kernel.MEMORY_ROWS, 6))
-        self._memory[0, kernel.LENGTH] = dt
+        self._memory = kernel.memory_of(self._order, dt)
         self._latest = np.empty(0)
         self._no_times = np.empty(0)
 

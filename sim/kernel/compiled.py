@@ -104,8 +104,12 @@ def generic(function: F) -> F:
     return cast(F, cast(Any, register_jitable)(**options)(function))
 
 
-def compiled(signature: object) -> Callable[[F], F]:
-    """Compile a function for one numba `signature`, for example ``"float64(float64[::1])"``, or an object of numba."""
+def compiled(signature: object, *, internal: bool = False) -> Callable[[F], F]:
+    """Compile a function for one numba `signature`, for example ``"float64(float64[::1])"``, or an object of numba.
+
+    An `internal` function is called by other compiled functions only: the wrapper for calls from Python is omitted,
+    which takes longer to compile than a short function.
+    """
 
     def decorate(function: F) -> F:
         with _one_at_a_time:
@@ -116,7 +120,7 @@ def compiled(signature: object) -> Callable[[F], F]:
                 # other code keeps its cache
                 before, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(folder)
                 try:
-                    made = _njit(signature, function, cache=True)
+                    made = _njit(signature, function, cache=True, internal=internal)
                     if _is_within(made, folder):
                         return made
                     cache.give_up(f"numba does not use {folder}")
@@ -127,7 +131,7 @@ def compiled(signature: object) -> Callable[[F], F]:
                     cache.give_up(f"{folder} cannot be used ({type(error).__name__}: {error}); remove this folder")
                 finally:
                     numba.config.CACHE_DIR = before
-            return _njit(signature, function, cache=False)
+            return _njit(signature, function, cache=False, internal=internal)
 
     return decorate
 
@@ -166,6 +170,6 @@ def _cache_of(function: Callable[..., Any]) -> KernelCache:
     return _caches[folder]
 
 
-def _njit(signature: object, function: F, *, cache: bool) -> F:
-    decorator = cast(Any, numba.njit)(signature, cache=cache, nogil=True, error_model="numpy", no_cfunc_wrapper=True)
-    return cast(F, decorator(function))
+def _njit(signature: object, function: F, *, cache: bool, internal: bool) -> F:
+    options = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True, "no_cpython_wrapper": internal}
+    return cast(F, cast(Any, numba.njit)(signature, cache=cache, **options)(function))

@@ -105,6 +105,11 @@ def magnitude(x: float) -> float:
     return abs(x)
 
 
+def greater(x: float, y: float) -> float:
+    """The greater of two numbers; the other one if one is not a number."""
+    return y if not x > y else x
+
+
 def some(x: float) -> bool:
     """Whether x, or any lane of it, differs from 0."""
     return x != 0.0
@@ -178,6 +183,7 @@ for _operators, _name in (
 _arithmetic(operator.neg, 1, _instruction("fneg"), own=False)
 for _function, _name in ((root, "sqrt"), (sine, "sin"), (cosine, "cos"), (magnitude, "fabs")):
     _arithmetic(_function, 1, _intrinsic(_name), own=True)
+_arithmetic(greater, 2, _intrinsic("maxnum"), own=True)
 _arithmetic(fma, 3, _intrinsic("fma"), own=True)
 
 

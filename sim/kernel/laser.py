@@ -48,7 +48,7 @@ class LaserState(NamedTuple):
 LASER: Any = types.NamedTuple((ROW, ROW, INT[::1], ROW, ROW), LaserState)
 
 
-@compiled("float64(float64, float64[::1])")
+@compiled("float64(float64, float64[::1])", internal=True)
 def output(displacement: float, constants: Array) -> float:
     """Voltage [V] across the load at a displacement [m] from mid range: 4 to 20 mA with a reserve of 1 % at both ends,
     and the error current beyond this range.

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.kernel.compiled import compiled, inlined
-from sim.kernel.lanes import LANES, get
-from sim.kernel.packing import COUPLED, H_B, B
+from sim.kernel.lanes import LANES, get, put
+from sim.kernel.packing import COUPLED
 from sim.kernel.steps import (
     COMPLETED,
     END,
@@ -25,39 +25,44 @@ from sim.kernel.steps import (
     STATUS,
     STEPS,
     is_physical,
+    scales,
     step_length,
     strike,
 )
-from sim.kernel.taylor import WORK_ROWS, forcing_coefficients, resting_coefficients, rocking_coefficients
-from sim.kernel.watching import (
-    IMPACT,
-    NO_EVENT,
-    OVERTURNING,
-    UPLIFT,
-    bends,
-    first_event,
-    is_clear,
-    raise_peaks,
+from sim.kernel.taylor import (
+    forcing_coefficients,
+    last_terms,
+    limits,
+    resting_coefficients,
+    rocking_coefficients,
     state_at,
     tail,
 )
-
-Array = NDArray[np.float64]
-
-TAIL, SIDE, LENGTH, TAU, BEGIN, LOST, MET = range(7)
-"""Rows of `values`: tail of the step's polynomial, corner, length of the step [s], time since the segment's start [s],
-start of the segment [s] and its rounding error, length of the last segment at rest (negative if tabulated).
-"""
-
-MEMBER, SEGMENT, KNOWN, STEPPED, ASKS, WAITING = range(6)
-"""Rows of `places`: member of the lane (-1: none), its segment, number of known roots theta = 0, the segment at
-whose start the block rests and which needs Taylor steps, and whether the lane needs the exact step at rest. The first
-value of WAITING is the first member without a lane.
-"""
-
-NO_VALUES, NO_PLACES = np.zeros((7, LANES)), np.zeros((6, LANES), np.int64)
-NO_VALUES[SIDE], NO_PLACES[MEMBER] = 1.0, -1
-"""`values` and `places` of lanes without members."""
+from sim.kernel.watching import IMPACT, NO_EVENT, OVERTURNING, UPLIFT, first_event, is_clear, raise_peaks
+from sim.kernel.workspace import (
+    ASKS,
+    BEFORE,
+    BEGIN,
+    FLOOR,
+    KNOWN,
+    LAST,
+    LENGTH,
+    LOST,
+    MEMBER,
+    MET,
+    REACH,
+    SEGMENT,
+    SIDE,
+    STEPPED,
+    TAIL,
+    TAU,
+    WAITING,
+    WORK,
+    Array,
+    Places,
+    Workspace,
+    workspace,
+)
 
 MEMBERS = (
     "float64[:,::1], int64[::1], float64[:,::1], int64[:,::1], float64[:,::1], int64, float64, float64, float64,"
@@ -87,17 +92,17 @@ def advance_members(
     peaks_from : shape (m,) [s].  reports : shape (m, REPORT), written.
     The other arguments are those of `sim.kernel.rocking.run`.
     """
-    memory, places = NO_VALUES.copy(), NO_PLACES.copy()
+    lanes = workspace(order)
     arguments = specimens, specimen_of, segments, spans, states, order, tolerance, theta_limit, rest_angle, peaks_from
-    if advance_lanes(*arguments, impact_limit, reports, memory, places):
+    if advance_lanes(*arguments, impact_limit, reports, lanes):
         # compiled only when a block first rests under an acceleration that is not a sine
         from sim.kernel.members_at_rest import advance_with_rest
 
-        advance_with_rest(*arguments, impact_limit, reports, memory, places)
+        advance_with_rest(*arguments, impact_limit, reports, lanes)
 
 
 @inlined
-def end_segment(values: Array, places: NDArray[np.int64], lane: int, length: float) -> None:
+def end_segment(values: Array, places: Places, lane: int, length: float) -> None:
     """Set a lane to the start of its next segment."""
     # compensated sum, because a record has tens of thousands of equal segments
     begin, gained = values[BEGIN, lane], length - values[LOST, lane]
@@ -113,7 +118,7 @@ def is_linear(segment: Array) -> bool:
     return segment[1] == 0.0 and segment[2] == 0.0 and segment[3] == 0.0 and segment[4] == 0.0
 
 
-@compiled(f"boolean({MEMBERS}, float64[:,::1], int64[:,::1])")
+@compiled(f"boolean({MEMBERS}, {WORK})")
 def advance_lanes(
     specimens: Array,
     specimen_of: NDArray[np.int64],
@@ -127,32 +132,18 @@ def advance_lanes(
     peaks_from: Array,
     impact_limit: int,
     reports: Array,
-    memory: Array,
-    numbers: NDArray[np.int64],
+    lanes: Workspace,
 ) -> bool:
     """Take steps of all lanes. Returns False when every member has ended, and True when the block of a member rests at
     the start of a segment of linear acceleration.
 
     The exact step for such a segment, in the lanes marked in the row ASKS, is taken by `sim.kernel.members_at_rest`,
-    which then calls this function again. Between calls, `memory` and `numbers` keep the `values` and `places`.
+    which then calls this function again with the same `lanes`, the arrays of `workspace`.
     """
     count = states.shape[0]
-    # allocated here, because the compiler then knows their shapes
-    values, places = np.zeros((7, LANES)), np.zeros((6, LANES), np.int64)
-    p, row = np.ones((16, LANES)), np.zeros((10, LANES))
-    a, c, w = np.zeros((n + 1, LANES)), np.zeros((6, n + 1, LANES)), np.zeros((WORK_ROWS, n + 1, LANES))
-    following, bounds = np.zeros((6, LANES)), np.zeros((3, LANES))
-    a1, c1, after, e = np.zeros(n + 1), np.zeros((6, n + 1)), np.zeros(6), np.zeros(n + 1)
-    for lane in range(LANES):
-        for k in range(7):
-            values[k, lane] = memory[k, lane]
-        for k in range(6):
-            places[k, lane] = numbers[k, lane]
-        if places[MEMBER, lane] >= 0:
-            for k in range(16):
-                p[k, lane] = specimens[specimen_of[places[MEMBER, lane]], k]
+    values, places, p, row, a, c, w, following, bounds, a1, c1, after, e = lanes
     while True:
-        active, rocking, watching, asking = 0, 0, 0, False
+        active, rocking, watching, asking = 0, False, False, False
         for lane in range(LANES):
             while True:
                 j = places[MEMBER, lane]
@@ -161,18 +152,20 @@ def advance_lanes(
                         break
                     j = places[MEMBER, lane] = places[WAITING, 0]
                     places[WAITING, 0] += 1
+                    i, theta = spans[j, 0], states[j, 4]
                     for k in range(16):
                         p[k, lane] = specimens[specimen_of[j], k]
                     for k in range(REPORT):
                         reports[j, k] = 0.0
-                    places[SEGMENT, lane], places[STEPPED, lane] = spans[j, 0], -1
+                    places[SEGMENT, lane], places[STEPPED, lane] = i, -1
                     values[TAU, lane] = values[BEGIN, lane] = values[LOST, lane] = 0.0
-                    values[MET, lane] = segments[spans[j, 0], 0]
-                    values[SIDE, lane] = np.sign(states[j, 4] if states[j, 4] != 0.0 else states[j, 5])
-                    places[KNOWN, lane] = 1 if states[j, 4] == 0.0 else 0
-                i, begin = places[SEGMENT, lane], values[BEGIN, lane]
+                    values[MET, lane] = segments[i, 0]
+                    values[REACH, lane], values[FLOOR, lane] = scales(specimens[specimen_of[j]])
+                    values[SIDE, lane] = np.sign(theta if theta != 0.0 else states[j, 5])
+                    places[KNOWN, lane] = 1 if theta == 0.0 else 0
+                i = places[SEGMENT, lane]
                 if i == spans[j, 1]:
-                    reports[j, END] = begin
+                    reports[j, END] = values[BEGIN, lane]
                     places[MEMBER, lane] = -1
                     continue
                 if not segments[i, 0] - values[TAU, lane] > 1e-14 * segments[i, 0]:
@@ -184,55 +177,52 @@ def advance_lanes(
                     asking = True
                     break
                 active += 1
-                rocking += 1 if values[SIDE, lane] != 0.0 else 0
-                watching += 1 if peaks_from[j] < np.inf else 0
+                rocking = rocking or values[SIDE, lane] != 0.0
+                watching = watching or peaks_from[j] < np.inf
                 for k in range(6):
                     c[k, 0, lane] = states[j, k]
                 for k in range(10):
                     row[k, lane] = segments[i, k]
                 break
         if asking or active == 0:
-            for lane in range(LANES):
-                for k in range(7):
-                    memory[k, lane] = values[k, lane]
-                for k in range(6):
-                    numbers[k, lane] = places[k, lane]
             return asking
 
         forcing_coefficients(row, get(values, TAU), a, n)
-        if rocking > 0:
+        if rocking:
             rocking_coefficients(p, get(values, SIDE), a, c, w, n)
         for lane in range(LANES):
-            values[LENGTH, lane] = 0.0
             j = places[MEMBER, lane]
-            if j >= 0:
-                if values[SIDE, lane] == 0.0:
-                    for k in range(6):
-                        c1[k, 0] = c[k, 0, lane]
+            if j >= 0 and values[SIDE, lane] == 0.0:
+                for k in range(6):
+                    c1[k, 0] = c[k, 0, lane]
+                for k in range(n + 1):
+                    a1[k] = a[k, lane]
+                resting_coefficients(specimens[specimen_of[j]], a1, c1, n)
+                for i in range(6):
                     for k in range(n + 1):
-                        a1[k] = a[k, lane]
-                    resting_coefficients(specimens[specimen_of[j]], a1, c1, n)
-                    for i in range(6):
-                        for k in range(n + 1):
-                            c[i, k, lane] = c1[i, k]
-                reach = np.hypot(p[B, lane], p[H_B, lane])
-                before = (abs(c[2, n - 1, lane]) + abs(c[3, n - 1, lane])) / reach + abs(c[5, n - 1, lane])
-                final = (abs(c[2, n, lane]) + abs(c[3, n, lane])) / reach + abs(c[5, n, lane])
+                        c[i, k, lane] = c1[i, k]
+        before, last = last_terms(c, n, get(values, REACH))
+        put(values, BEFORE, before)
+        put(values, LAST, last)
+        for lane in range(LANES):
+            values[LENGTH, lane] = 0.0
+            if places[MEMBER, lane] >= 0:
                 values[LENGTH, lane] = step_length(
-                    specimens[specimen_of[j]],
+                    values[REACH, lane],
+                    values[FLOOR, lane],
                     c[2, 0, lane],
                     c[3, 0, lane],
                     c[5, 0, lane],
-                    final,
-                    before,
+                    values[LAST, lane],
+                    values[BEFORE, lane],
                     n,
                     tolerance,
                     row[0, lane] - values[TAU, lane],
                 )
         state_at(c, n, get(values, LENGTH), following)
         tail(c, n, get(values, LENGTH), values)  # written to the first row, TAIL
-        if watching > 0:
-            bends(c, n, get(values, LENGTH), bounds)
+        if watching:
+            limits(c, n, get(values, LENGTH), following, bounds)
 
         for lane in range(LANES):
             j = places[MEMBER, lane]
@@ -265,15 +255,10 @@ def advance_lanes(
                     )
                 )
                 if clear and not seen:
-                    most_1, most_2 = (
-                        max(abs(c[0, 0, lane]), abs(after[0])),
-                        max(abs(c[1, 0, lane] - c[0, 0, lane]), abs(after[1] - after[0])),
-                    )
-                    most_3, part = max(abs(c[4, 0, lane]), abs(after[4])), 0.125 * h * h
                     seen = (
-                        most_1 + part * bounds[0, lane] <= reports[j, PEAKS]
-                        and most_2 + part * bounds[1, lane] <= reports[j, PEAKS + 1]
-                        and most_3 + part * bounds[2, lane] <= reports[j, PEAKS + 2]
+                        bounds[0, lane] <= reports[j, PEAKS]
+                        and bounds[1, lane] <= reports[j, PEAKS + 1]
+                        and bounds[2, lane] <= reports[j, PEAKS + 2]
                     )
                 if not (clear and seen):
                     for i in range(6):

@@ -5,37 +5,35 @@ all other steps are those of `sim.kernel.members`. This module is separate, beca
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sim.kernel.compiled import compiled
 from sim.kernel.lanes import LANES
-from sim.kernel.members import (
+from sim.kernel.members import MEMBERS, advance_lanes, end_segment, is_linear
+from sim.kernel.resting import LOOK_INSIDE, MUST_STEP, SPACE, TABLE_ROWS, glide, propagator
+from sim.kernel.steps import PEAKS, STEPS
+from sim.kernel.taylor import forcing_coefficients, resting_coefficients
+from sim.kernel.watching import raise_peaks
+from sim.kernel.workspace import (
     ASKS,
     BEGIN,
     KNOWN,
     LOST,
     MEMBER,
-    MEMBERS,
     MET,
     SEGMENT,
     STEPPED,
+    WORK,
     Array,
-    advance_lanes,
-    end_segment,
-    is_linear,
+    Places,
+    Workspace,
 )
-from sim.kernel.resting import LOOK_INSIDE, MUST_STEP, TABLE_ROWS, glide, propagator
-from sim.kernel.steps import PEAKS, STEPS
-from sim.kernel.taylor import forcing_coefficients, resting_coefficients
-from sim.kernel.watching import raise_peaks
 
 
-@compiled(f"void({MEMBERS}, float64[:,::1], int64[:,::1])")
 def advance_with_rest(
     specimens: Array,
-    specimen_of: NDArray[np.int64],
+    specimen_of: Places,
     segments: Array,
-    spans: NDArray[np.int64],
+    spans: Places,
     states: Array,
     n: int,
     tolerance: float,
@@ -44,12 +42,38 @@ def advance_with_rest(
     peaks_from: Array,
     impact_limit: int,
     reports: Array,
-    values: Array,
-    places: NDArray[np.int64],
+    lanes: Workspace,
 ) -> None:
     """Take the exact steps requested by `advance_lanes`, then call it again, until every member has ended."""
-    tables, no_samples = np.zeros((LANES, TABLE_ROWS, 6)), np.empty((0, 6))
-    a1, c1, after, e = np.zeros(n + 1), np.zeros((6, n + 1)), np.zeros(6), np.zeros(n + 1)
+    scratch = np.zeros((LANES, TABLE_ROWS, 6)), np.zeros(SPACE), np.empty((0, 6))
+    arguments = specimens, specimen_of, segments, spans, states, n, tolerance, theta_limit, rest_angle, peaks_from
+    _advance(*arguments, impact_limit, reports, lanes, *scratch)
+
+
+@compiled(f"void({MEMBERS}, {WORK}, float64[:,:,::1], float64[:,:,::1], float64[:,::1])")
+def _advance(
+    specimens: Array,
+    specimen_of: Places,
+    segments: Array,
+    spans: Places,
+    states: Array,
+    n: int,
+    tolerance: float,
+    theta_limit: float,
+    rest_angle: float,
+    peaks_from: Array,
+    impact_limit: int,
+    reports: Array,
+    lanes: Workspace,
+    tables: Array,
+    space: Array,
+    no_samples: Array,
+) -> None:
+    """See `advance_with_rest`.
+
+    tables : propagator of every lane, shape (LANES, TABLE_ROWS, 6).  space : shape SPACE.  no_samples : shape (0, 6).
+    """
+    values, places, _, _, _, _, _, _, _, a1, c1, after, e = lanes
     asking = True
     while asking:
         for lane in range(LANES):
@@ -63,7 +87,7 @@ def advance_with_rest(
                 # a single one; a negative length means that it has been computed
                 if values[MET, lane] == length:
                     values[MET, lane] = -length
-                    propagator(specimen, length, n, tolerance, table)
+                    propagator(specimen, length, n, tolerance, table, space)
                 elif values[MET, lane] != -length:
                     values[MET, lane] = length
                 if values[MET, lane] == -length and table[0, 0] > 0.0:
@@ -107,6 +131,5 @@ def advance_with_rest(
             peaks_from,
             impact_limit,
             reports,
-            values,
-            places,
+            lanes,
         )

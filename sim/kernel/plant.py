@@ -73,7 +73,7 @@ class Plant(NamedTuple):
 PLANT: Any = types.NamedUniTuple(FLOAT, len(Plant._fields), Plant)
 
 
-@compiled(FLOAT(FLOAT, FLOAT, FLOAT, PLANT))
+@compiled(FLOAT(FLOAT, FLOAT, FLOAT, PLANT), internal=True)
 def table_force(x: float, v: float, request: float, p: Plant) -> float:
     """Force [N] of coil, suspension, friction and end stops on the table.
 
@@ -99,7 +99,7 @@ def table_force(x: float, v: float, request: float, p: Plant) -> float:
     return force
 
 
-@compiled(VOID(INT, ROW, FLOAT, FLOAT, PLANT, ROW))
+@compiled(VOID(INT, ROW, FLOAT, FLOAT, PLANT, ROW), internal=True)
 def rates(mode: int, y: Array, request: float, noise: float, p: Plant, dy: Array) -> None:
     """Write the time derivative of the state `y`, shape (8,), into `dy`; dy[1] is the table's acceleration.
 
@@ -137,13 +137,13 @@ def rates(mode: int, y: Array, request: float, noise: float, p: Plant, dy: Array
     dy[4], dy[5] = storey1 / p.m1 - a, storey2 / p.m2 - a
 
 
-@compiled(FLOAT(ROW, ROW, PLANT))
+@compiled(FLOAT(ROW, ROW, PLANT), internal=True)
 def overturning_moment(y: Array, dy: Array, p: Plant) -> float:
     """h_b M a - k_c h1 u1 [N m] of the resting block, which lifts when the magnitude exceeds b g M (Eqs. 9, A.3)."""
     return p.h_b * p.mass * dy[1] - p.k_c * p.h1 * y[2]
 
 
-@compiled(FLOAT(PLANT))
+@compiled(FLOAT(PLANT), internal=True)
 def restitution_on_table(p: Plant) -> float:
     """Ratio of the angular velocities after and before an impact on a table that can move.
 
@@ -155,7 +155,7 @@ def restitution_on_table(p: Plant) -> float:
     return (p.restitution * p.inertia - give) / (p.inertia - give)
 
 
-@compiled(VOID(ROW, FLOAT, PLANT))
+@compiled(VOID(ROW, FLOAT, PLANT), internal=True)
 def turn(y: Array, omega: float, p: Plant) -> None:
     """Change the block's angular velocity to `omega` instantaneously; the table takes the horizontal impulse.
 

@@ -18,22 +18,40 @@ from sim.kernel.packing import C1, C2, COUPLED, GRAVITY, H1, H_B, K1, K2, K_C, M
 TABLE_ROWS = 9
 """Rows of a propagator: u1, u2, v1, v2, then bounds of the moment, u1, the drift, and the rates of u1 and drift."""
 
+SPACE = 9, 6, 6
+"""Shape of the scratch space of `propagator`."""
+
+_A, _EXPONENTIAL, _TERM, _PRODUCT, _WATCHED, _BEND = 0, 2, 4, 6, 7, 8
+"""First indices in the scratch space: the matrix, its exponential and a term of its series, each followed by that of
+the magnitudes, a product of matrices, the watched quantities, and their second derivatives.
+"""
+
 MUST_STEP, GLIDED, LOOK_INSIDE, ANOTHER_KIND = range(4)
 """Results of `glide`: the block may lift in the segment; all segments are taken; the block does not lift, but a peak
 may be inside the segment; the segment is a sine or has another length.
 """
 
 
-@compiled("void(float64[::1], float64, int64, float64, float64[:,::1])")
-def propagator(p: NDArray[np.float64], h: float, n: int, tolerance: float, table: NDArray[np.float64]) -> None:
+@compiled("void(float64[::1], float64, int64, float64, float64[:,::1], float64[:,:,::1])", internal=True)
+def propagator(
+    p: NDArray[np.float64],
+    h: float,
+    n: int,
+    tolerance: float,
+    table: NDArray[np.float64],
+    space: NDArray[np.float64],
+) -> None:
     """Write the exact step of length `h` [s] and its bounds to `table`, shape (TABLE_ROWS, 6).
 
     The first element, which is otherwise positive, is 0 if the table cannot be used, because a Taylor polynomial of
-    order `n`, needed for the peaks within the step, does not reach `tolerance`.
+    order `n`, needed for the peaks within the step, does not reach `tolerance`. `space` is scratch space.
     """
     # plain loops: array expressions would add seconds of compilation
-    system = np.zeros((2, 6, 6))
-    linear = system[0]
+    for k in range(9):
+        for i in range(6):
+            for j in range(6):
+                space[k, i, j] = 0.0
+    linear, watched, bend = space[_A], space[_WATCHED], space[_BEND]
     linear[0, 2] = linear[1, 3] = linear[4, 5] = 1.0
     linear[2, 0], linear[2, 1] = -(p[K1] + p[K2] + p[K_C]) / p[M1], p[K2] / p[M1]
     linear[2, 2], linear[2, 3] = -(p[C1] + p[C2]) / p[M1], p[C2] / p[M1]
@@ -50,24 +68,23 @@ def propagator(p: NDArray[np.float64], h: float, n: int, tolerance: float, table
         table[0, 0] = 0.0
         return
     # exp(A h) and exp(|A| h) by their series: 1 / 25! is far below rounding
-    grown, term, product = np.zeros((2, 6, 6)), np.zeros((2, 6, 6)), np.zeros((6, 6))
     for i in range(6):
-        grown[0, i, i] = grown[1, i, i] = term[0, i, i] = term[1, i, i] = 1.0
+        for k in range(_EXPONENTIAL, _PRODUCT):
+            space[k, i, i] = 1.0
         for j in range(6):
-            system[1, i, j] = abs(linear[i, j])
+            space[_A + 1, i, j] = abs(linear[i, j])
     for k in range(1, 26):
         for which in range(2):
             for i in range(6):
                 for j in range(6):
                     total = 0.0
                     for m in range(6):
-                        total += term[which, i, m] * system[which, m, j]
-                    product[i, j] = total * h / k
+                        total += space[_TERM + which, i, m] * space[_A + which, m, j]
+                    space[_PRODUCT, i, j] = total * h / k
             for i in range(6):
                 for j in range(6):
-                    term[which, i, j] = product[i, j]
-                    grown[which, i, j] += product[i, j]
-    watched, bend = np.zeros((5, 6)), np.zeros((5, 6))
+                    space[_TERM + which, i, j] = space[_PRODUCT, i, j]
+                    space[_EXPONENTIAL + which, i, j] += space[_PRODUCT, i, j]
     watched[0, 0], watched[0, 4] = -p[K_C] * p[H1], p[H_B] * p[MASS]
     watched[1, 0] = watched[2, 1] = watched[3, 2] = watched[4, 3] = 1.0
     watched[2, 0] = watched[4, 2] = -1.0
@@ -79,14 +96,15 @@ def propagator(p: NDArray[np.float64], h: float, n: int, tolerance: float, table
         for j in range(6):
             table[4 + i, j] = 0.0
             if i < 4:
-                table[i, j] = grown[0, i, j]
+                table[i, j] = space[_EXPONENTIAL, i, j]
             for k in range(6):
-                table[4 + i, j] += 0.125 * h * h * abs(bend[i, k]) * grown[1, k, j]
+                table[4 + i, j] += 0.125 * h * h * abs(bend[i, k]) * space[_EXPONENTIAL + 1, k, j]
 
 
 @compiled(
     "Tuple((int64, int64))(float64[::1], float64[:,::1], float64[:,::1], int64, float64[::1], float64, float64,"
-    " float64[::1], float64[::1], float64[::1], float64[:,::1], int64)"
+    " float64[::1], float64[::1], float64[::1], float64[:,::1], int64)",
+    internal=True,
 )
 def glide(
     p: NDArray[np.float64],

@@ -12,9 +12,8 @@ and samples do not affect the motion: they are evaluated on unchanged steps.
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.kernel.compiled import compiled, inlined
-from sim.kernel.packing import H_B, B
-from sim.kernel.resting import ANOTHER_KIND, GLIDED, LOOK_INSIDE, MUST_STEP, TABLE_ROWS, glide, propagator
+from sim.kernel.compiled import compiled
+from sim.kernel.resting import ANOTHER_KIND, GLIDED, LOOK_INSIDE, MUST_STEP, SPACE, TABLE_ROWS, glide, propagator
 from sim.kernel.steps import (
     COMPLETED,
     END,
@@ -30,10 +29,19 @@ from sim.kernel.steps import (
     STATUS,
     STEPS,
     is_physical,
+    scales,
     step_length,
     strike,
 )
-from sim.kernel.taylor import WORK_ROWS, forcing_coefficients, resting_coefficients, rocking_coefficients
+from sim.kernel.taylor import (
+    WORK_ROWS,
+    forcing_coefficients,
+    last_terms,
+    resting_coefficients,
+    rocking_coefficients,
+    state_at,
+    tail,
+)
 from sim.kernel.watching import (
     IMPACT,
     NO_EVENT,
@@ -42,24 +50,28 @@ from sim.kernel.watching import (
     first_event,
     is_clear,
     raise_peaks,
-    state_at,
-    tail,
 )
 
 STARTED, SIDE, KNOWN, BEGIN, LOST, LENGTH = range(6)
-"""Indices in the first row of `advance`'s memory: whether it has begun, corner, number of known roots theta = 0, time
+"""Indices in the first array of a run's memory: whether it has begun, corner, number of known roots theta = 0, time
 at the end of the segments so far [s] and its rounding error, length of the last segment at rest (negative if
 tabulated).
 """
 
-MEMORY_ROWS = 1 + TABLE_ROWS
-"""Rows of `advance`'s memory: one row of scalars, then the propagator of the frame while the block rests."""
+MEMORY = (
+    "Tuple((float64[::1], float64[:,::1], float64[:,::1], float64[:,::1], float64[::1], float64[::1], float64[::1],"
+    " float64[:,:,::1]))"
+)
+"""Type of the arrays returned by `memory_of`."""
+
+Array = NDArray[np.float64]
+Memory = tuple[Array, Array, Array, Array, Array, Array, Array, Array]
 
 AT_ONCE = 1e-12
 """Difference [s] below which two times count as the same instant."""
 
 
-@compiled("float64(float64, float64, float64[::1], int64, int64, int64, int64)")
+@compiled("float64(float64, float64, float64[::1], int64, int64, int64, int64)", internal=True)
 def next_sample(
     length: float, begin: float, times: NDArray[np.float64], divisions: int, place: int, filled: int, room: int
 ) -> float:
@@ -69,9 +81,20 @@ def next_sample(
     return length * place / divisions if divisions > 0 else times[filled] - begin
 
 
+def memory_of(order: int, length: float) -> Memory:
+    """Memory of a run that has not begun, for Taylor series of the given order; its first segment has the `length` [s].
+
+    Allocated by the caller of `advance`, because numba compiles the allocation of an array anew for each shape.
+    """
+    kept, table = np.zeros(6), np.zeros((TABLE_ROWS, 6))
+    kept[LENGTH] = length
+    c, w, a, e = np.zeros((6, order + 1)), np.zeros((WORK_ROWS, order + 1)), np.zeros(order + 1), np.zeros(order + 1)
+    return kept, table, c, w, a, e, np.zeros(6), np.zeros(SPACE)
+
+
 @compiled(
     "void(float64[::1], float64[:,::1], float64[::1], float64[::1], int64, float64[:,::1],"
-    " int64, float64, float64, float64, float64, float64, int64, float64[:,::1], float64[::1])"
+    f" int64, float64, float64, float64, float64, float64, int64, {MEMORY}, float64[::1])"
 )
 def advance(
     p: NDArray[np.float64],
@@ -87,24 +110,21 @@ def advance(
     rest_angle: float,
     peaks_from: float,
     impact_limit: int,
-    memory: NDArray[np.float64],
+    memory: Memory,
     report: NDArray[np.float64],
 ) -> None:
     """Integrate through the next segments. Several calls give results that are bit-identical to those of one call.
 
-    memory, report : shapes (MEMORY_ROWS, 6) and (REPORT,); before the first call, zeros except for the LENGTH of the
-    first segment; managed by this function from then on.
+    memory, report : of `memory_of`, and zeros of shape (REPORT,), before the first call; managed by this function from
+    then on.
     divisions : if positive, every segment is divided into this number of equal parts, a sample is due at the end of
     each part, and `sample_times` is ignored. `samples`, shape (m, 6), receives at most m samples; the report counts
     those of this call. The other arguments are those of `run`.
     """
     n = order
-    c = np.zeros((6, n + 1))
-    w = np.zeros((WORK_ROWS, n + 1))
-    a = np.zeros(n + 1)
-    e = np.zeros(n + 1)
-    following = np.zeros(6)
-    peaks, table, kept = report[PEAKS:], memory[1:], memory[0]
+    kept, table, c, w, a, e, following, space = memory
+    peaks = report[PEAKS:]
+    reach, floor = scales(p)
     if kept[STARTED] == 0.0:
         kept[STARTED] = 1.0
         kept[SIDE] = np.sign(x[4]) if x[4] != 0.0 else np.sign(x[5])
@@ -124,7 +144,7 @@ def advance(
             # single one; a negative length means that it has been computed
             if kept[LENGTH] == row[0]:
                 kept[LENGTH] = -row[0]
-                propagator(p, row[0], n, tolerance, table)
+                propagator(p, row[0], n, tolerance, table, space)
             elif kept[LENGTH] != -row[0]:
                 kept[LENGTH] = row[0]
             if kept[LENGTH] == -row[0] and table[0, 0] > 0.0 and row[0] <= longest_step:
@@ -167,10 +187,8 @@ def advance(
                 else:
                     resting_coefficients(p, a, c, n)
             if found == MUST_STEP:
-                reach = np.hypot(p[B], p[H_B])
-                before = (abs(c[2, n - 1]) + abs(c[3, n - 1])) / reach + abs(c[5, n - 1])
-                last = (abs(c[2, n]) + abs(c[3, n])) / reach + abs(c[5, n])
-                h = step_length(p, x[2], x[3], x[5], last, before, n, tolerance, allowed)
+                before, last = last_terms(c, n, reach)
+                h = step_length(reach, floor, x[2], x[3], x[5], last, before, n, tolerance, allowed)
                 if not h >= min(SHORTEST_STEP, allowed):
                     status = FAILED
                     break
@@ -238,7 +256,6 @@ def advance(
     report[STATUS], report[END], report[IMPACTS], report[STEPS], report[SAMPLES] = status, now, impacts, steps, filled
 
 
-@inlined
 def run(
     p: NDArray[np.float64],
     segments: NDArray[np.float64],
@@ -269,10 +286,7 @@ def run(
     angle of the next bounce, omega^2 / (2 a) with a = (b g M - |m|) / J, stays below `rest_angle`; the error of the
     angle is then at most rest_angle, and that of the energy at most b g M rest_angle.
     """
-    memory = np.zeros((MEMORY_ROWS, 6))
-    memory[0, LENGTH] = segments[0, 0]
-    for k in range(REPORT):
-        report[k] = 0.0
+    report[:REPORT] = 0.0
     advance(
         p,
         segments,
@@ -287,6 +301,6 @@ def run(
         rest_angle,
         peaks_from,
         impact_limit,
-        memory,
+        memory_of(order, segments[0, 0]),
         report,
     )

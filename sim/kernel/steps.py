@@ -24,9 +24,21 @@ LARGEST_STATE = 1e6
 """Bound on the magnitude of every component of a state. A run fails if its state exceeds it or becomes NaN."""
 
 
-@compiled("float64(float64[::1], float64, float64, float64, float64, float64, int64, float64, float64)")
+@compiled("UniTuple(float64, 2)(float64[::1])", internal=True)
+def scales(p: NDArray[np.float64]) -> tuple[float, float]:
+    """Distance R [m] of the block's centre from its corners, and the angular velocity [rad/s] below which a step needs
+    no relative accuracy: a thousandth of p alpha of the block.
+    """
+    reach = np.hypot(p[B], p[H_B])
+    return reach, 1e-3 * p[B] / p[H_B] * np.sqrt(p[MASS] * p[GRAVITY] * reach / p[INERTIA])
+
+
+@compiled(
+    "float64(float64, float64, float64, float64, float64, float64, float64, int64, float64, float64)", internal=True
+)
 def step_length(
-    p: NDArray[np.float64],
+    reach: float,
+    floor: float,
     v1: float,
     v2: float,
     omega: float,
@@ -38,14 +50,12 @@ def step_length(
 ) -> float:
     """Length [s] of a step from the last two coefficients, at most `allowed`; NaN if a coefficient is not finite.
 
+    reach, floor : `scales` of the specimen.
     last, before : coefficients n and n - 1 of the velocities, combined as (|v1| + |v2|) / R + |omega|.
     Source: Jorba and Zou (2005).
     """
     if not (last < np.inf and before < np.inf):
         return np.nan
-    reach = np.hypot(p[B], p[H_B])
-    # velocities below a thousandth of p alpha of the block need no relative accuracy
-    floor = 1e-3 * p[B] / p[H_B] * np.sqrt(p[MASS] * p[GRAVITY] * reach / p[INERTIA])
     scale = tolerance * max(max(abs(v1), abs(v2)) / reach, abs(omega), floor)
     limit = np.inf
     if last > 0.0:
@@ -55,7 +65,7 @@ def step_length(
     return np.exp(limit) if limit < np.log(allowed) else allowed
 
 
-@compiled("boolean(float64[::1])")
+@compiled("boolean(float64[::1])", internal=True)
 def is_physical(x: NDArray[np.float64]) -> bool:
     """Whether the magnitude of every component of a state is a number below LARGEST_STATE."""
     physical = True
@@ -64,7 +74,7 @@ def is_physical(x: NDArray[np.float64]) -> bool:
     return physical
 
 
-@compiled("void(float64[::1], float64[::1], float64, float64)")
+@compiled("void(float64[::1], float64[::1], float64, float64)", internal=True)
 def strike(p: NDArray[np.float64], x: NDArray[np.float64], acceleration: float, rest_angle: float) -> None:
     """Set `x`, shape (6,), to the state after an impact, rocking or at rest, under a base acceleration [m/s2]."""
     holding = p[B] * p[GRAVITY] * p[MASS]

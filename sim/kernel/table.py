@@ -42,7 +42,7 @@ _INSTANT = 1.0e-14
 """Accuracy of the instant of an event [s]."""
 
 
-@compiled(VOID(INT, ROW, FLOAT, FLOAT, FLOAT, FLOAT, PLANT, GRID))
+@compiled(VOID(INT, ROW, FLOAT, FLOAT, FLOAT, FLOAT, PLANT, GRID), internal=True)
 def advance(mode: int, y: Array, h: float, held: float, request: float, noise: float, p: Plant, work: Array) -> None:
     """Take one Runge-Kutta step of length `h` from `y`, and write the state to work[4]. work[0] contains the rates at
     `y`.
@@ -66,7 +66,7 @@ def advance(mode: int, y: Array, h: float, held: float, request: float, noise: f
         out[i] = y[i] + h / 6.0 * (work[0, i] + 2.0 * (work[1, i] + work[2, i]) + work[3, i])
 
 
-@compiled(FLOAT(INT, INT, ROW, FLOAT, FLOAT, PLANT, GRID))
+@compiled(FLOAT(INT, INT, ROW, FLOAT, FLOAT, PLANT, GRID), internal=True)
 def margin(event: int, mode: int, y: Array, request: float, noise: float, p: Plant, work: Array) -> float:
     """Margin of the state `y` to `event` [rad, or N m for the uplift]: positive before the event, negative past it."""
     if event == _IMPACT:
@@ -77,7 +77,7 @@ def margin(event: int, mode: int, y: Array, request: float, noise: float, p: Pla
     return p.b * p.g * p.mass - abs(overturning_moment(y, work[5], p))
 
 
-@compiled(FLOAT(INT, INT, ROW, FLOAT, FLOAT, FLOAT, FLOAT, PLANT, GRID))
+@compiled(FLOAT(INT, INT, ROW, FLOAT, FLOAT, FLOAT, FLOAT, PLANT, GRID), internal=True)
 def locate(
     event: int, mode: int, y: Array, h: float, held: float, request: float, noise: float, p: Plant, work: Array
 ) -> float:
@@ -123,7 +123,7 @@ def locate(
     return previous
 
 
-@compiled(INT(INT, ROW, FLOAT, FLOAT, PLANT, GRID))
+@compiled(INT(INT, ROW, FLOAT, FLOAT, PLANT, GRID), internal=True)
 def impact(mode: int, y: Array, request: float, noise: float, p: Plant, work: Array) -> int:
     """Transfer the block from one corner to the other (Housner), or to rest. Returns the new mode."""
     y[6] = 0.0
@@ -139,7 +139,7 @@ def impact(mode: int, y: Array, request: float, noise: float, p: Plant, work: Ar
     return other
 
 
-@compiled(INT(INT, ROW, FLOAT, FLOAT, PLANT, GRID))
+@compiled(INT(INT, ROW, FLOAT, FLOAT, PLANT, GRID), internal=True)
 def passed(mode: int, y: Array, request: float, noise: float, p: Plant, work: Array) -> int:
     """Event passed by a step that ends in the state `y`; _NONE if no event is passed."""
     if mode == REST:
@@ -151,7 +151,7 @@ def passed(mode: int, y: Array, request: float, noise: float, p: Plant, work: Ar
     return _CATCH if margin(_CATCH, mode, y, request, noise, p, work) < 0.0 else _NONE
 
 
-@compiled(types.Tuple((INT, FLOAT))(INT, ROW, FLOAT, FLOAT, FLOAT, FLOAT, PLANT, GRID))
+@compiled(types.Tuple((INT, FLOAT))(INT, ROW, FLOAT, FLOAT, FLOAT, FLOAT, PLANT, GRID), internal=True)
 def substep(
     mode: int, y: Array, h: float, held: float, request: float, noise: float, p: Plant, work: Array
 ) -> tuple[int, float]:

@@ -1,4 +1,4 @@
-"""Taylor coefficients of the motion and of its excitation at one instant.
+"""Taylor coefficients of the motion and of its excitation at one instant, and evaluation of the polynomials.
 
 Coefficient k of x(t0 + t) = sum x_k t^k follows from the lower ones through the equations of motion: products are
 convolutions, sines and roots have recurrences (Jorba and Zou, 2005). Rows of `c` are u1, u2, v1, v2, theta, omega.
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.kernel.compiled import generic
-from sim.kernel.lanes import cosine, fma, get, get2, put, put2, root, sine, some, zero
+from sim.kernel.lanes import cosine, fma, get, get2, greater, magnitude, put, put2, root, sine, some, zero
 from sim.kernel.packing import C1, C2, GRAVITY, H1, H_B, INERTIA, K1, K2, K_C, M1, M2, MASS, B, D
 
 WORK_ROWS = 8
@@ -179,3 +179,66 @@ def rocking_coefficients(
         put2(c, 3, k + 1, fma(fma(c2, v1 - v2, k2 * shear), inverse_2, -get(a, k)) * inverse)
         gravity = weight * fma(h_b, s, -side * cs)
         put2(c, 5, k + 1, fma(spring, moment, fma(inertial, pushed, gravity)) * inverse)
+
+
+@generic
+def state_at(c: NDArray[np.float64], n: int, t: float, out: NDArray[np.float64]) -> None:
+    """Write the values of the six polynomials at time `t` of the step to `out`, shape (6,); also for many members."""
+    # six interleaved sums: if computed separately, each addition would wait for the previous one
+    u1, u2, v1, v2 = get2(c, 0, n), get2(c, 1, n), get2(c, 2, n), get2(c, 3, n)
+    theta, omega = get2(c, 4, n), get2(c, 5, n)
+    for k in range(n - 1, -1, -1):
+        u1, u2 = fma(u1, t, get2(c, 0, k)), fma(u2, t, get2(c, 1, k))
+        v1, v2 = fma(v1, t, get2(c, 2, k)), fma(v2, t, get2(c, 3, k))
+        theta, omega = fma(theta, t, get2(c, 4, k)), fma(omega, t, get2(c, 5, k))
+    put(out, 0, u1)
+    put(out, 1, u2)
+    put(out, 2, v1)
+    put(out, 3, v2)
+    put(out, 4, theta)
+    put(out, 5, omega)
+
+
+@generic
+def bends(c: NDArray[np.float64], n: int, h: float, out: NDArray[np.float64]) -> None:
+    """Write bounds of |u1''|, |u2'' - u1''| and |theta''| over a step of length `h` to `out`, shape (3,)."""
+    bend_1 = bend_2 = bend_3 = zero(out)
+    for k in range(n, 1, -1):
+        factor = float(k * (k - 1))
+        bend_1 = fma(bend_1, h, factor * magnitude(get2(c, 0, k)))
+        bend_2 = fma(bend_2, h, factor * magnitude(get2(c, 1, k) - get2(c, 0, k)))
+        bend_3 = fma(bend_3, h, factor * magnitude(get2(c, 4, k)))
+    put(out, 0, bend_1)
+    put(out, 1, bend_2)
+    put(out, 2, bend_3)
+
+
+@generic
+def limits(c: NDArray[np.float64], n: int, h: float, following: NDArray[np.float64], out: NDArray[np.float64]) -> None:
+    """Write upper limits of |u1|, |u2 - u1| and |theta| over a step of length `h` to `out`, shape (3,).
+
+    following : the state at `h`, shape (6,).
+    """
+    bends(c, n, h, out)
+    part = 0.125 * h * h
+    drift, after = get2(c, 1, 0) - get2(c, 0, 0), get(following, 1) - get(following, 0)
+    put(out, 0, greater(magnitude(get2(c, 0, 0)), magnitude(get(following, 0))) + part * get(out, 0))
+    put(out, 1, greater(magnitude(drift), magnitude(after)) + part * get(out, 1))
+    put(out, 2, greater(magnitude(get2(c, 4, 0)), magnitude(get(following, 4))) + part * get(out, 2))
+
+
+@generic
+def last_terms(c: NDArray[np.float64], n: int, reach: float) -> tuple[float, float]:
+    """Coefficients n - 1 and n of the velocities, each combined as (|v1| + |v2|) / reach + |omega|."""
+    before = (magnitude(get2(c, 2, n - 1)) + magnitude(get2(c, 3, n - 1))) / reach + magnitude(get2(c, 5, n - 1))
+    last = (magnitude(get2(c, 2, n)) + magnitude(get2(c, 3, n))) / reach + magnitude(get2(c, 5, n))
+    return before, last
+
+
+@generic
+def tail(c: NDArray[np.float64], n: int, h: float, out: NDArray[np.float64]) -> None:
+    """Write the sum of |theta_k| h^(k - 5) for k = 5..n to `out`, shape (1,)."""
+    total = magnitude(get2(c, 4, n))
+    for k in range(n - 1, 4, -1):
+        total = fma(total, h, magnitude(get2(c, 4, k)))
+    put(out, 0, total)

@@ -1,4 +1,4 @@
-"""Evaluation of a step's polynomials: samples, peaks and the first event.
+"""Peaks and the first event of a step, from its polynomials.
 
 `c`, shape (6, n + 1), contains the Taylor coefficients of u1, u2, v1, v2, theta, omega, and `a` those of the base
 acceleration. A step lasts from 0 to `h`. `e` is scratch space, shape (n + 1,).
@@ -7,11 +7,12 @@ acceleration. A step lasts from 0 to `h`. `e` is scratch space, shape (n + 1,).
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.kernel.compiled import compiled, generic
-from sim.kernel.lanes import fma, get2, magnitude, put, zero
+from sim.kernel.compiled import compiled
+from sim.kernel.lanes import fma
 from sim.kernel.packing import COUPLED, GRAVITY, H1, H_B, K_C, MASS, B
 from sim.kernel.roots import first_root, greatest_magnitude
 from sim.kernel.steps import PEAKS
+from sim.kernel.taylor import bends
 
 NO_EVENT, IMPACT, OVERTURNING, UPLIFT = range(4)
 """Endings of a step."""
@@ -20,48 +21,9 @@ UPLIFT_MARGIN = 1e-12
 """Relative excess of |m| over b g M that counts as uplift, so that rounding alone never lifts a block."""
 
 
-@generic
-def state_at(c: NDArray[np.float64], n: int, t: float, out: NDArray[np.float64]) -> None:
-    """Write the values of the six polynomials at time `t` of the step to `out`, shape (6,); also for many members."""
-    # six interleaved sums: if computed separately, each addition would wait for the previous one
-    u1, u2, v1, v2 = get2(c, 0, n), get2(c, 1, n), get2(c, 2, n), get2(c, 3, n)
-    theta, omega = get2(c, 4, n), get2(c, 5, n)
-    for k in range(n - 1, -1, -1):
-        u1, u2 = fma(u1, t, get2(c, 0, k)), fma(u2, t, get2(c, 1, k))
-        v1, v2 = fma(v1, t, get2(c, 2, k)), fma(v2, t, get2(c, 3, k))
-        theta, omega = fma(theta, t, get2(c, 4, k)), fma(omega, t, get2(c, 5, k))
-    put(out, 0, u1)
-    put(out, 1, u2)
-    put(out, 2, v1)
-    put(out, 3, v2)
-    put(out, 4, theta)
-    put(out, 5, omega)
-
-
-@generic
-def bends(c: NDArray[np.float64], n: int, h: float, out: NDArray[np.float64]) -> None:
-    """Write bounds of |u1''|, |u2'' - u1''| and |theta''| over a step of length `h` to `out`, shape (3,)."""
-    bend_1 = bend_2 = bend_3 = zero(out)
-    for k in range(n, 1, -1):
-        factor = float(k * (k - 1))
-        bend_1 = fma(bend_1, h, factor * magnitude(get2(c, 0, k)))
-        bend_2 = fma(bend_2, h, factor * magnitude(get2(c, 1, k) - get2(c, 0, k)))
-        bend_3 = fma(bend_3, h, factor * magnitude(get2(c, 4, k)))
-    put(out, 0, bend_1)
-    put(out, 1, bend_2)
-    put(out, 2, bend_3)
-
-
-@generic
-def tail(c: NDArray[np.float64], n: int, h: float, out: NDArray[np.float64]) -> None:
-    """Write the sum of |theta_k| h^(k - 5) for k = 5..n to `out`, shape (1,)."""
-    total = magnitude(get2(c, 4, n))
-    for k in range(n - 1, 4, -1):
-        total = fma(total, h, magnitude(get2(c, 4, k)))
-    put(out, 0, total)
-
-
-@compiled("void(float64[:,::1], int64, float64, float64, float64[::1], boolean, float64[::1], float64[::1])")
+@compiled(
+    "void(float64[:,::1], int64, float64, float64, float64[::1], boolean, float64[::1], float64[::1])", internal=True
+)
 def raise_peaks(
     c: NDArray[np.float64],
     n: int,
@@ -96,7 +58,7 @@ def raise_peaks(
             report[PEAKS + which] = greatest_magnitude(e, n, start, h, peak)
 
 
-@compiled("float64(float64, float64, float64)")
+@compiled("float64(float64, float64, float64)", internal=True)
 def least_of_parabola(first: float, line: float, bend: float) -> float:
     """Minimum of first + line s + bend s^2 for s in [0, 1]."""
     if bend > 0.0 and -2.0 * bend < line < 0.0:
@@ -105,7 +67,7 @@ def least_of_parabola(first: float, line: float, bend: float) -> float:
 
 
 @compiled(
-    "boolean(float64, float64, float64, float64, float64, float64, float64, float64, int64, float64)",
+    "boolean(float64, float64, float64, float64, float64, float64, float64, float64, int64, float64)", internal=True
 )
 def is_clear(
     sg: float,
@@ -139,7 +101,8 @@ def is_clear(
 
 @compiled(
     "Tuple((float64, int64, float64))(float64[::1], float64, float64[:,::1], float64[::1], int64, float64, int64,"
-    " float64, float64[::1])"
+    " float64, float64[::1])",
+    internal=True,
 )
 def first_event(
     p: NDArray[np.float64],
