@@ -19,6 +19,9 @@ ROUNDING, NOTHING = 2e-15, 1e-300
 which is needed because relative bounds fail for denormal numbers.
 """
 
+CUBIC = 1e-15
+"""Bound of a cubic term, relative to the value, below which a polynomial is a parabola up to its extremum."""
+
 
 @compiled("Tuple((float64, float64, float64))(float64[::1], int64, float64)")
 def evaluate(p: NDArray[np.float64], n: int, t: float) -> tuple[float, float, float]:
@@ -86,14 +89,28 @@ def first_root(p: NDArray[np.float64], n: int, h: float) -> float:
     return t
 
 
-@compiled("float64(float64[::1], int64, float64, float64, float64)")
-def greatest_magnitude(p: NDArray[np.float64], n: int, start: float, h: float, best: float) -> float:
-    """Greater of `best` and the greatest |sum p_k t^k|, k = 0..n, for t in [start, h]."""
+@compiled("float64(float64[::1], int64, float64, float64, float64, float64, float64, float64, float64)")
+def greatest_magnitude(
+    p: NDArray[np.float64],
+    n: int,
+    start: float,
+    h: float,
+    begin: float,
+    rise: float,
+    end: float,
+    fall: float,
+    best: float,
+) -> float:
+    """Greater of `best` and the greatest |sum p_k t^k|, k = 0..n, for t in [start, h].
+
+    begin, rise : value and first derivative at `start`.  end, fall : value and first derivative at `h`.
+    """
     # the ends first: over a step that is long for its motion, the polynomial is small until it grows like a high power
     # of t
-    best = max(best, abs(evaluate(p, n, start)[0]), abs(evaluate(p, n, h)[0]))
+    best = max(best, abs(begin), abs(end))
     most = sharpest = jerkiest = bounded = 0.0
     left, width, floor = start, h - start, SMALLEST_PART * h
+    left_slope = rise  # NaN after a part that is discarded
     while left < h:
         right = min(left + width, h)
         if right != bounded:
@@ -111,6 +128,7 @@ def greatest_magnitude(p: NDArray[np.float64], n: int, start: float, h: float, b
         t = left + half
         value, slope, half_bend = evaluate(p, n, t)
         best = max(best, abs(value))
+        right_slope = np.nan
         # ignore negligible values, and an excess over `best` that is only due to rounding, here or in the sum
         above = best * (1.0 + 1e-14) + ROUNDING * most + NOTHING
         if abs(value) + half * (abs(slope) + 0.5 * sharpest * half) > above:
@@ -119,24 +137,33 @@ def greatest_magnitude(p: NDArray[np.float64], n: int, start: float, h: float, b
                     width *= 0.5
                     continue
                 floor *= FLOOR_GROWTH
-            # at most one extremum here: evaluate both ends and, if there is one, the zero of the slope between them
-            low, high = left, right
-            low_value, low_slope, _ = evaluate(p, n, low)
-            high_value, high_slope, _ = evaluate(p, n, high)
-            best = max(best, abs(low_value), abs(high_value))
-            if low_slope * high_slope < 0.0:
+            # at most one extremum here: where the slopes at both ends have different signs
+            right_slope = fall
+            if right < h:
+                other, right_slope, _ = evaluate(p, n, right)
+                best = max(best, abs(other))
+            if np.isnan(left_slope):
+                left_slope = evaluate(p, n, left)[1]
+            if left_slope * right_slope < 0.0:
+                low, high = left, right
                 for _ in range(60):
-                    value, slope, half_bend = evaluate(p, n, t)
-                    best = max(best, abs(value))
-                    if slope * low_slope > 0.0:
+                    if slope * left_slope > 0.0:
                         low = t
                     else:
                         high = t
-                    trial = t - 0.5 * slope / half_bend if half_bend != 0.0 else low
-                    if not low < trial < high:
+                    moved = -0.5 * slope / half_bend if half_bend != 0.0 else np.inf
+                    trial = t + moved
+                    inside = low < trial < high
+                    if inside and jerkiest * abs(moved) * moved * moved <= CUBIC * abs(value):
+                        # the extremum of the parabola through this point; its third derivative is negligible
+                        best = max(best, abs(value + 0.5 * slope * moved))
+                        break
+                    if not inside:
                         trial = 0.5 * (low + high)
                     if abs(trial - t) <= 1e-9 * h:
                         break
                     t = trial
-        left, width = right, 2.0 * width
+                    value, slope, half_bend = evaluate(p, n, t)
+                    best = max(best, abs(value))
+        left, width, left_slope = right, 2.0 * width, right_slope
     return best

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from sim.kernel.compiled import compiled
 from sim.kernel.lanes import fma
 from sim.kernel.packing import COUPLED, GRAVITY, H1, H_B, K_C, MASS, B
-from sim.kernel.roots import first_root, greatest_magnitude
+from sim.kernel.roots import evaluate, first_root, greatest_magnitude
 from sim.kernel.steps import PEAKS
 from sim.kernel.taylor import bends
 
@@ -49,13 +49,16 @@ def raise_peaks(
         else:
             bend, begin, end, slope, last = bend_3, c[4, 0], following[4], c[5, 0], following[5]
         most, peak = max(abs(begin), abs(end)), report[PEAKS + which]
-        if start == 0.0 and most > peak and slope * last > 0.0 and abs(slope) + abs(last) > bend * h:
-            report[PEAKS + which] = most  # the slope has no zero, so that the largest value is at one of the ends
+        if start == 0.0 and slope * last > 0.0 and abs(slope) + abs(last) > bend * h:
+            # the slope has no zero, so that the largest value is at one of the ends
+            report[PEAKS + which] = max(peak, most)
         # most steps raise no peak: the distance from the chord is at most h^2 / 8 times the largest second derivative
         elif most + 0.125 * h * h * bend > peak:
             for k in range(n + 1):
                 e[k] = c[0, k] if which == 0 else (c[1, k] - c[0, k] if which == 1 else c[4, k])
-            report[PEAKS + which] = greatest_magnitude(e, n, start, h, peak)
+            if start > 0.0:
+                begin, slope, _ = evaluate(e, n, start)
+            report[PEAKS + which] = greatest_magnitude(e, n, start, h, begin, slope, end, last, peak)
 
 
 @compiled("float64(float64, float64, float64)", internal=True)
