@@ -10,8 +10,6 @@
 from collections.abc import Generator, Mapping, Sequence
 from dataclasses import replace
 
-from bench.analysis.cycles import Cycle
-from bench.analysis.gain import steady_peak
 from bench.analysis.running_gain import RunningGain, shared_draws
 from bench.analysis.sensor_accuracy import SensorUncertainty
 from bench.config.model import BenchConfiguration
@@ -34,14 +32,12 @@ from bench.engine.steps import (
     Sweep,
 )
 from bench.events import PointFinished, StepStarted, Warned
-from bench.live_values import Estimate
 from drivers.rig import RigError
 from protocols.common.sine.calibration import NO_BLOCK, REST, bare_calibration, end_test, spring_calibration
 from protocols.common.sine.holding import SLOW, hold, prepared, too_late
 from protocols.common.sine.pace import Pace
 from protocols.common.sine.settling import (
     Held,
-    Report,
     Settled,
     TableState,
     checked,
@@ -52,6 +48,7 @@ from protocols.harmonic.approach import far, stable_above, with_pause
 from protocols.harmonic.free_prediction import with_free_prediction
 from protocols.harmonic.judgement import Conditions, judge, predicted_fields
 from protocols.harmonic.protocol import HarmonicParameters, HarmonicPoint, PointStatus
+from protocols.harmonic.running import RunningPoint
 from sim.gain import Branch, predict_gain
 from sim.specimen import Specimen
 from sim.steady import Orbit
@@ -266,7 +263,7 @@ class HarmonicPlan:
         free = settled.peak.drift
         limits = self._configuration.limits
         largest = min(GROWTH * free, limits.warning.drift * limits.drift)
-        report = self._report(omega, specimen)
+        report = self._running(omega, specimen).report
         return (
             yield from hold(
                 sine,
@@ -285,36 +282,22 @@ class HarmonicPlan:
     ) -> Generator[Step, Outcome, Settled | Fallen]:
         """Wait for a steady state and measure; publishes the running alpha_2 and its prediction."""
         sine = Sine(omega, self._amplitude, calibration)
-        report = self._report(omega, specimen)
+        running = self._running(omega, specimen)
         frame = linear_frame(self._configuration) if specimen is None else None
         free_cycles = 0 if specimen is None else self._parameters.free_cycles or 0
-        return settle_and_measure(sine, self._parameters, self._configuration.analysis, report, frame, free_cycles)
+        accuracy, pays = self._configuration.analysis, running.worth_waiting
+        return settle_and_measure(sine, self._parameters, accuracy, running.report, frame, free_cycles, pays)
 
-    def _report(self, omega: float, specimen: Specimen | None) -> Report:
-        """Callback that publishes the running gain."""
-        evaluated = 0
+    def _running(self, omega: float, specimen: Specimen | None) -> RunningPoint:
+        """The running gain of a test."""
         reference = self._bare.get(omega)
-        bare = reference.peak if reference else None
+        gain: RunningGain | None = None
         predicted = float("nan")
-        running: RunningGain | None = None
-        if specimen is not None and bare is not None:
-            running = RunningGain(bare, self._sensors, self._draws)
+        if specimen is not None and reference is not None:
+            gain = RunningGain(reference.peak, self._sensors, self._draws)
             branch = self._target_branch(specimen, omega)
             predicted = branch.alpha_2 if branch else predicted
-
-        def report(cycles: list[Cycle]) -> Generator[Step, Outcome, None]:
-            nonlocal evaluated
-            evaluated += len(cycles)
-            peak = steady_peak(cycles, omega)
-            alpha_2 = uncertainty = float("nan")
-            if running is not None:
-                found = running.of(peak)
-                alpha_2, uncertainty = found.alpha_2, found.uncertainty
-            beta = specimen.label if specimen else None
-            yield Publish(Estimate(omega, beta, evaluated, peak.drift, alpha_2, uncertainty, predicted))
-            yield Publish(self._pace.progress(f"settling at {omega:g} rad/s", omega, evaluated))
-
-        return report
+        return RunningPoint(omega, specimen.label if specimen else None, gain, predicted, self._pace)
 
     @property
     def _sensors(self) -> SensorUncertainty:

@@ -97,8 +97,14 @@ SHORTEST = 10.0
 PRECEDING = 96
 """Largest number of cycles before the measured ones from which the remaining transient is estimated."""
 
+MOST = 6
+"""Largest number of measurements of a steady motion of which each had a remaining transient worth a longer wait."""
+
 Report = Callable[[list[Cycle]], Generator[Step, Outcome, None]]
 """Callback that publishes the running gain at each check, from the cycles of the last window."""
+
+Waiting = Callable[[SteadyPeak], bool]
+"""Callback that tells whether the remaining transient of a measured peak is worth a longer wait."""
 
 
 def settle_and_measure(
@@ -108,12 +114,14 @@ def settle_and_measure(
     report: Report,
     frame: LinearFrame | None = None,
     free_cycles: int = 0,
+    waiting: Waiting | None = None,
 ) -> Generator[Step, Outcome, Settled | Fallen]:
     """Hold the table at `sine` until every signal is steady, then measure.
 
     A motion that is not steady within the settle limit is measured as modulated. The drive of such a motion is constant
     for the last `free_cycles` cycles before the limit, but at most for half of the limit. In a test of the bare frame,
-    its model `frame` is used to check the lasers.
+    its model `frame` is used to check the lasers. A steady motion for whose peak `waiting` holds is measured again, up
+    to `MOST` times and until the settle limit.
     """
     detector = SteadyDetector(parameters.settle_tolerance, JUDGED, LASERS, sine.omega * accuracy.laser_timing)
     control = SineControl(
@@ -125,7 +133,7 @@ def settle_and_measure(
         ),
     )
     turn: complex | None = None
-    updates, drive = 0, (1.0 + 0.0j,)
+    updates, drive, measurements = 0, (1.0 + 0.0j,), 0
     recent: deque[Cycle] = deque(maxlen=WINDOW)
     constant: deque[Cycle] = deque(maxlen=KEPT)
     measured = max(parameters.measured_cycles, 2 * WINDOW)
@@ -154,6 +162,12 @@ def settle_and_measure(
                 motion = orbit = None
                 if steadiness.steady:
                     peak = steady_peak(used, sine.omega, before=preceding(list(constant), used), frame=frame)
+                    measurements += 1
+                    if waiting is not None and not over and measurements < MOST and waiting(peak):
+                        recent.extend(cycles)
+                        yield from report(list(recent))
+                        over = waited >= limit
+                        continue
                 else:
                     kept = list(constant)
                     motion = free_motion(kept, sine.omega)

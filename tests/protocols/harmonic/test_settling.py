@@ -6,12 +6,14 @@ from math import cos, sin, tau
 import pytest
 
 from bench.analysis.cycles import Cycle
+from bench.analysis.gain import SteadyPeak
 from bench.analysis.signals import ACCELERATION
+from bench.analysis.steady import WINDOW
 from bench.config.model import BenchConfiguration
 from bench.control.oscillator import DriveCalibration
 from bench.control.sine import Sine
 from bench.engine.steps import Done, Dwell, Measured, Outcome, SetHarmonics, Step
-from protocols.common.sine.settling import AIM, Settled, settle_and_measure
+from protocols.common.sine.settling import AIM, MOST, Settled, Waiting, settle_and_measure
 from protocols.harmonic.protocol import HarmonicParameters
 from tests.made_cycles import pure_cycle
 from tests.protocols.harmonic.scripted import AMPLITUDE, cycle
@@ -29,7 +31,9 @@ def modulated(k: int) -> tuple[float, float]:
     return DRIFT * (1.0 + 0.3 * sin(2.4 * k)), 0.02 * cos(2.4 * k)
 
 
-def settled(motion: Motion, limit: float, free_cycles: int) -> tuple[Settled, list[int]]:
+def settled(
+    motion: Motion, limit: float, free_cycles: int, waiting: Waiting | None = None
+) -> tuple[Settled, list[int]]:
     """Result of a dwell, and the numbers of cycles after which the drive was corrected."""
 
     def report(_: list[Cycle]) -> Generator[Step, Outcome, None]:
@@ -44,7 +48,7 @@ def settled(motion: Motion, limit: float, free_cycles: int) -> tuple[Settled, li
     parameters = HarmonicParameters(settle_limit=limit)
     sine = Sine(OMEGA, AMPLITUDE, DriveCalibration.flat(AMPLITUDE))
     analysis = BenchConfiguration().analysis
-    steps = settle_and_measure(sine, parameters, analysis, report, free_cycles=free_cycles)
+    steps = settle_and_measure(sine, parameters, analysis, report, free_cycles=free_cycles, waiting=waiting)
     share, done, corrected = 1.0 + 0.0j, 0, list[int]()
     outcome: Outcome | None = None
     try:
@@ -90,3 +94,41 @@ def test_a_motion_that_becomes_steady_late_is_corrected_with_full_steps() -> Non
     assert found.time < limit
     assert len([k for k in corrected if k > change]) in {1, 2, 3, 4}
     assert abs(found.amplitude_error) <= AIM * HarmonicParameters().amplitude_tolerance
+
+
+def slow(k: int) -> tuple[float, float]:
+    """A motion that approaches its steady state by 2 % per cycle."""
+    return DRIFT * (1.0 + 0.2 * 0.98**k), 0.0
+
+
+def test_a_steady_motion_is_measured_again_while_its_transient_is_worth_the_wait() -> None:
+    least = 2e-4 * DRIFT
+    at_once, _ = settled(slow, 240.0, 0)
+    assert at_once.peak.transient > least
+    patient, _ = settled(slow, 240.0, 0, lambda peak: peak.transient > least)
+    assert patient.steadiness.steady
+    assert patient.peak.transient <= least
+    assert patient.time > at_once.time
+    assert abs(patient.peak.drift - DRIFT) < abs(at_once.peak.drift - DRIFT)
+
+
+@pytest.mark.parametrize("spare", [None, 12.0])
+def test_the_wait_ends_after_several_measurements_or_at_the_limit(spare: float | None) -> None:
+    measured = max(HarmonicParameters().measured_cycles, 2 * WINDOW)
+    asked = list[SteadyPeak]()
+
+    def never_enough(peak: SteadyPeak) -> bool:
+        asked.append(peak)
+        return True
+
+    at_once, _ = settled(slow, 240.0, 0)
+    limit = 240.0 if spare is None else at_once.time + spare
+    found, _ = settled(slow, limit, 0, never_enough)
+    assert found.steadiness.steady
+    if spare is None:
+        assert len(asked) == MOST - 1
+        assert found.time < limit
+    else:
+        assert 0 < len(asked) < MOST - 1
+        # a measurement may begin just before the limit, and one follows it
+        assert limit <= found.time <= limit + 2 * measured * PERIOD
