@@ -140,6 +140,16 @@ def _turns(items: list[pytest.Item]) -> Callable[[pytest.Item], int]:
     return turn
 
 
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Generator[None, Any, Any]:
+    """Nothing of what is imported and collected is garbage: looking for it takes a fifth of the time."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.enable()
+
+
 def pytest_collection_finish() -> None:
     """What is there when the first test begins stays until the end: the garbage collector need not look at it."""
     gc.collect()
