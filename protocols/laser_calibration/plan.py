@@ -24,10 +24,10 @@ from bench.engine.steps import (
 )
 from bench.events import Progress, StepStarted
 from protocols.common.calibrate import SETTLING, Unmeasurable, calibrate_drive, complete_cycles, probed_drive
-from protocols.laser_calibration.curves import HARMONICS, ErrorCurve, Pass, fit_curve, mean_pass
+from protocols.laser_calibration.curves import HARMONICS, ErrorCurve, Pass, mean_pass
 from protocols.laser_calibration.protocol import LaserCalibrationParameters
-from protocols.laser_calibration.reference import ReferenceCurve, fit_reference
-from protocols.laser_calibration.scales import calibration, require_agreement
+from protocols.laser_calibration.reference import ReferenceCurve
+from protocols.laser_calibration.scales import calibrate
 from sim.channel import STOREYS
 
 REST = 2.0
@@ -92,23 +92,17 @@ def measure(
         yield RampOut(fast=True)
         raise
     yield RampOut()
-    reference = fit_reference(passes, parameters.reference_linearity)
-    passes = reference.corrected(passes)
-    curves = fit_curve(passes, 0, rests[0]), fit_curve(passes, 1, rests[1])
-    require_agreement(curves)
     devices = {channel.name: channel.device for channel in at_rest.channels}
-    found = calibration(
+    return calibrate(
         passes,
-        curves,
         rests,
         (devices[STOREYS[0]], devices[STOREYS[1]]),
         configuration.analysis,
         configuration.laser_ranges,
-        common_linearity=reference.remaining,
+        reference_linearity=parameters.reference_linearity,
         valid_days=parameters.valid_days,
         date=datetime.now(UTC).replace(microsecond=0),
     )
-    return found, curves, reference
 
 
 def _passes(parameters: LaserCalibrationParameters) -> Generator[Step, Outcome, list[Pass]]:

@@ -17,12 +17,42 @@ from bench.analysis.sensor_accuracy import SensorAccuracy
 from bench.analysis.uncertainty import COVERAGE
 from bench.config.model import BenchConfiguration
 from protocols.common.calibrate import Unmeasurable
-from protocols.laser_calibration.curves import ErrorCurve, Pass
+from protocols.laser_calibration.curves import ErrorCurve, Pass, fit_curve
 from protocols.laser_calibration.polynomial import jackknife, values
-from protocols.laser_calibration.reference import ReferenceCurve
+from protocols.laser_calibration.reference import ReferenceCurve, fit_reference
 from protocols.laser_calibration.standards import IMPLAUSIBLE, standards
 
 Array = NDArray[np.float64]
+
+
+def calibrate(
+    passes: Sequence[Pass],
+    rests: tuple[float, float],
+    devices: tuple[str, str],
+    accuracy: SensorAccuracy,
+    ranges: tuple[float, float],
+    *,
+    reference_linearity: float,
+    valid_days: float,
+    date: datetime,
+) -> tuple[LaserCalibration, tuple[ErrorCurve, ErrorCurve], ReferenceCurve]:
+    """Calibration of all sensors from the measured passes, the error curves of the lasers, and that of the table's
+    displacement sensor, for which the passes are corrected.
+
+    `rests` [m] are the readings of the lasers at rest; `accuracy` and `ranges` [m] are taken from their data sheets,
+    `reference_linearity` [m] from that of the displacement sensor.
+
+    Raises Unmeasurable if the lasers do not measure the same motion.
+    """
+    reference = fit_reference(passes, reference_linearity)
+    passes = reference.corrected(passes)
+    curves = fit_curve(passes, 0, rests[0]), fit_curve(passes, 1, rests[1])
+    require_agreement(curves)
+    common, days = reference.remaining, valid_days
+    found = calibration(
+        passes, curves, rests, devices, accuracy, ranges, common_linearity=common, valid_days=days, date=date
+    )
+    return found, curves, reference
 
 
 def calibration(

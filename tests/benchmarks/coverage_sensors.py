@@ -13,11 +13,11 @@ from bench.analysis.cycles import Cycle, CycleAnalyser
 from bench.analysis.laser_calibration import LaserCalibration
 from bench.analysis.sensor_accuracy import SensorAccuracy
 from bench.analysis.signals import SignalMap
-from protocols.laser_calibration.curves import HARMONICS, fit_curve, mean_pass
+from protocols.laser_calibration.curves import HARMONICS, mean_pass
 from protocols.laser_calibration.plan import planned_passes
 from protocols.laser_calibration.protocol import LaserCalibrationParameters
-from protocols.laser_calibration.reference import ReferenceCurve, fit_reference
-from protocols.laser_calibration.scales import calibration
+from protocols.laser_calibration.reference import ReferenceCurve
+from protocols.laser_calibration.scales import calibrate
 from sim.excitation import SampledRecord
 from sim.filter_unit import FilterUnit
 from sim.kernel.laser import WAVE_PHASE
@@ -181,17 +181,13 @@ class Sensors:
             signals = self.signals(Motion(x, v, a, zero, zero, zero, zero), None)
             cycles = cycles_of(signals, omega, HARMONICS)
             passes.append(mean_pass(cycles, omega))
-        reference = fit_reference(passes, asked.reference_linearity)
-        passes = reference.corrected(passes)
-        rests = float(self.reading(0, np.zeros(1))[0]), float(self.reading(1, np.zeros(1))[0])
-        found = calibration(
+        found, _, reference = calibrate(
             passes,
-            (fit_curve(passes, 0, rests[0]), fit_curve(passes, 1, rests[1])),
-            rests,
+            (float(self.reading(0, np.zeros(1))[0]), float(self.reading(1, np.zeros(1))[0])),
             ("first", "second"),
             ACCURACY,
             RANGES,
-            common_linearity=reference.remaining,
+            reference_linearity=asked.reference_linearity,
             valid_days=asked.valid_days,
             date=datetime.now(UTC),
         )
