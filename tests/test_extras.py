@@ -90,7 +90,7 @@ def test_without_any_extra_a_command_names_what_it_needs_and_predictions_are_mad
 @pytest.mark.parametrize(
     ("extra", "device", "runs"),
     [
-        ("ni", ["--server", "localhost:1"], [(HARDWARE, ["run", "harmonic"]), (ANALOGUE, ["check"])]),
+        ("ni", ["--server", "localhost:1"], [(HARDWARE, ["run", "laser-calibration"]), (ANALOGUE, ["check"])]),
         ("serial", ["--port", "COM9"], [(HARDWARE, ["check"])]),
     ],
 )

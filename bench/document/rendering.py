@@ -2,12 +2,13 @@
 """Rendering of a report as one HTML file, and as A4 pages of a PDF.
 
 The HTML has no script and no reference to another file; its template escapes all text. For the PDF, matplotlib draws
-each figure as a PDF file, which Typst embeds; text is passed to the template `report.typ` as JSON and is never read as
-markup.
+each figure as a page of a PDF file, which Typst embeds; text is passed to the template `report.typ` as JSON and is
+never read as markup.
 """
 
 import io
 import re
+from collections.abc import Iterable
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -74,17 +75,17 @@ def write_pdf(path: Path, document: Document) -> None:
 
     def empty(picture: Picture, _number: int) -> dict[str, Any]:
         width, height = _largest_size(picture.figure)
-        drawings.append((picture, {"file": None, "width": INCH * width, "height": INCH * height}))
+        drawings.append((picture, {"page": None, "width": INCH * width, "height": INCH * height}))
         return drawings[-1][1]
 
     content = template_content(document, empty)
     with temporary_folder() as folder:
         typesetter = Typesetter(folder, content)
         typesetter.fill_pages(INCH * HEIGHT)
-        for number, (picture, drawing) in enumerate(drawings, 1):
-            drawing["file"] = f"figure-{number}.pdf"
-            size = drawing["width"] / INCH, drawing["height"] / INCH
-            _save_pdf(picture.figure, folder / drawing["file"], size)
+        sizes = [(drawing["width"] / INCH, drawing["height"] / INCH) for _, drawing in drawings]
+        _save_pages(folder / "figures.pdf", zip([picture.figure for picture, _ in drawings], sizes, strict=True))
+        for page, (_, drawing) in enumerate(drawings, 1):
+            drawing["page"] = page
         path.write_bytes(typesetter.pdf())
 
 
@@ -125,15 +126,19 @@ def _largest_size(figure: "Figure") -> tuple[float, float]:
     return narrower * width, min(HEIGHT, height * narrower**0.5)
 
 
-def _save_pdf(figure: "Figure", path: Path, size: tuple[float, float]) -> None:
-    """Saves a figure of `size` [in]. It is drawn at that size rather than scaled, so that its text keeps its size."""
+def _save_pages(path: Path, figures: "Iterable[tuple[Figure, tuple[float, float]]]") -> None:
+    """Saves figures as the pages of one file, each with a size [in]. A figure is drawn at that size rather than scaled,
+    so that its text keeps its size. The parts of the fonts that the figures need are extracted once for all of them.
+    """
     import matplotlib
+    from matplotlib.backends.backend_pdf import PdfPages
 
-    own = tuple(figure.get_size_inches())
-    figure.set_size_inches(*size)
-    try:
-        # embedded fonts instead of outlines, so that text can be searched and copied
-        with matplotlib.rc_context({"pdf.fonttype": 42}):
-            figure.savefig(path, format="pdf")
-    finally:
-        figure.set_size_inches(*own)
+    # embedded fonts instead of outlines, so that text can be searched and copied
+    with matplotlib.rc_context({"pdf.fonttype": 42}), PdfPages(path) as pages:
+        for figure, size in figures:
+            own = tuple(figure.get_size_inches())
+            figure.set_size_inches(*size)
+            try:
+                pages.savefig(figure)
+            finally:
+                figure.set_size_inches(*own)

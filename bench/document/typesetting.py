@@ -12,7 +12,8 @@ Part = dict[str, Any]
 
 class Typesetter:
     """Typesets the content of a report, as `bench.document.document.template_content` returns it. The `drawing` of a
-    figure is a dictionary with `width` and `height` [pt] and its `file` in the folder; None is an empty box.
+    figure is a dictionary with `width` and `height` [pt] and its `page` in the file figures.pdf in the folder; None is
+    an empty box.
     """
 
     def __init__(self, folder: Path, content: dict[str, Any]) -> None:

@@ -40,9 +40,10 @@ MILLI = 1e3
 def new_figure(width: float, height: float) -> "Figure":
     """An empty figure of `width` by `height` inches, without a window."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(width, height), dpi=DPI, layout="constrained")
+    from bench.figures.saved_figure import SavedFigure
+
+    figure = SavedFigure(figsize=(width, height), dpi=DPI, layout="constrained")
     FigureCanvasAgg(figure)
     return figure
 

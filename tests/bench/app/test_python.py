@@ -19,15 +19,16 @@ import pytest
 
 import bench
 from bench.analysis.signals import SIGNALS
+from bench.app import run as running
 from bench.app.cli.main import main
 from bench.app.predictions import SteadyPrediction
-from bench.app.session import SessionResult, run_session
+from bench.app.session import SessionResult
 from bench.datafile.reader import open_datafile
 from bench.events import Acquired, Event, Subscriber
 from sim.rocking import State
 from sim.specimen import Block
 
-pytestmark = pytest.mark.usefixtures("shared_results")
+pytestmark = pytest.mark.usefixtures("shared_results", "no_figures")
 STORED = Path("tests/data/first_edition/harmonic_point.h5.xz")
 QUICK = {"omega": 20, "beta": 0.25, "starts": 1, "ramp_time": 2, "settle_tolerance": 0.01, "measured_cycles": 8}
 
@@ -196,13 +197,14 @@ def followed(tmp_path_factory: pytest.TempPathFactory) -> Followed:
     blocks: list[Acquired] = []
     said: list[tuple[str, float]] = []
     growing: list[tuple[str, int]] = []
+    session = running.run_session
 
     def keep(event: Event) -> None:
         if isinstance(event, Acquired):
             blocks.append(event)
 
     def watched(*given: Any, subscribers: Sequence[Subscriber], **more: Any) -> SessionResult:
-        return run_session(*given, subscribers=[*subscribers, keep], **more)
+        return session(*given, subscribers=[*subscribers, keep], **more)
 
     def progress(text: str, share: float) -> None:
         said.append((text, share))

@@ -4,14 +4,17 @@ import os
 import shlex
 import shutil
 import subprocess
+from collections.abc import Generator
 from contextlib import redirect_stdout
 from functools import cache
-from inspect import getdoc
+from inspect import getdoc, getsource
 from io import FileIO, StringIO, TextIOWrapper
 from pathlib import Path
 from pkgutil import resolve_name
+from typing import Any
 
 import pytest
+from cyclopts import App
 
 from bench.app.cli.main import COMMANDS as TREE
 from bench.app.cli.main import main, rockbench_app
@@ -20,6 +23,24 @@ from tests.command_line import commands
 Said = pytest.CaptureFixture[str]
 APP = rockbench_app()
 COMMANDS = [path for path, _ in commands(APP)]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _made_once() -> Generator[None]:
+    """The script of a shell, which takes half a second, and the source of each class of options, which cyclopts looks
+    up for every command anew.
+    """
+    generate, scripts = App.generate_completion, dict[str, str]()
+
+    def generated(app: App, *, shell: Any) -> str:
+        if shell not in scripts:
+            scripts[shell] = generate(app, shell=shell)
+        return scripts[shell]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(App, "generate_completion", generated)
+        patch.setattr("docstring_parser.attrdoc.inspect.getsource", cache(getsource))
+        yield
 
 
 @pytest.mark.parametrize("path", COMMANDS, ids=" ".join)
@@ -72,9 +93,8 @@ def _completed(script: Path, typed: str) -> set[str]:
     return {line.strip() for line in done.stdout.splitlines()}
 
 
-@cache
 def _script(shell: str) -> str:
-    """What `completion` prints, made once: it takes a second."""
+    """What `completion` prints."""
     with redirect_stdout(StringIO()) as out:
         assert main(["completion", shell]) == 0
     return out.getvalue()

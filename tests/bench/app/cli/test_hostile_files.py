@@ -9,6 +9,7 @@ import pytest
 from bench.app.cli.main import main
 from tests.bench.datafile.hostile import INSTEAD, Kind, additions, kinds
 from tests.installed import example
+from tests.undrawn import undrawn
 
 SOON = 2.0
 """Longest time of a command [s]; the machine of the tests may be busy, so it counts processor time."""
@@ -29,7 +30,8 @@ def sound(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("hostile")
     with example(folder / "site", "tone_sweep"):
         out = folder / "run"
-        assert main(["run", "tone-sweep", "--omega", "40", "--cycles", "4", "--out", str(out), "--json"]) == 0
+        with undrawn():
+            assert main(["run", "tone-sweep", "--omega", "40", "--cycles", "4", "--out", str(out), "--json"]) == 0
         for number, command in enumerate(COMMANDS):
             assert main(_line(command, out / "campaign.h5", folder / f"sound {number}")) == 0
         yield out / "campaign.h5"

@@ -1,6 +1,6 @@
 """Ctrl-C in real processes: answered within half a second in whatever phase a command is, and nothing is left behind.
 
-Ten early moments of commands of every kind; with the mark soak twenty moments of all commands, also later ones.
+Nine early moments of commands of every kind; with the mark soak twenty moments of all commands, also later ones.
 `python -m tests.interrupts` runs two hundred.
 """
 
@@ -16,7 +16,6 @@ if sys.platform == "win32":
 KINDS = (
     "run: planning",
     "run: point",
-    "run: json",
     "queue",
     "predict steady: first",
     "predict map",
@@ -27,7 +26,8 @@ KINDS = (
 )
 """Planning in native code, rigs that are driven, a kernel that is compiled, files that are written, a window."""
 MOMENTS = [
-    *moments(len(KINDS), seed=16_599, only=KINDS, latest=1.5),
+    # a draw in which each command is in the phase that it stands for, and a rig that is driven gets a second signal
+    *moments(len(KINDS), seed=466_552, only=KINDS, latest=1.5),
     *(pytest.param(each, marks=pytest.mark.soak) for each in moments(20, seed=20, latest=6.0)),
 ]
 

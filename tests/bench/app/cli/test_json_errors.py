@@ -110,8 +110,8 @@ def test_an_interrupt_has_a_code(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 
 def test_a_dry_run_that_is_refused_is_one_object(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Said) -> None:
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "bench.toml").write_text("[limits]\ndrift = 0.001\n", encoding="utf-8")
-    argv = ["run", "harmonic", "--omega", "16", "--beta", "0.4", "--config", "bench.toml", "--dry-run", "--json"]
+    (tmp_path / "bench.toml").write_text("[limits]\nforce = 5.0\n", encoding="utf-8")
+    argv = ["run", "laser-calibration", "--config", "bench.toml", "--dry-run", "--json"]
     assert main(argv) == 2
     assert _error(capsys, alone=False)["code"] == "invalid_input"
 

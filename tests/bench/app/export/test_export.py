@@ -364,16 +364,17 @@ def test_memory_does_not_grow_with_the_run(
     monkeypatch.setattr(format, "ROWS_AT_ONCE", piece)
     monkeypatch.setattr("bench.datafile.checksums.ROWS_AT_ONCE", piece)
     peaks: list[int] = []
-    for number, pieces in enumerate((2, 2, 8)):
+    for number, pieces in enumerate((1, 2, 6)):
         path = tmp_path / f"{number}.h5"
         recorder = Recorder(path, channels=CHANNELS, sample_rate=1e4, point_type=Found, metadata={}, hold_up=60.0)
         for first in range(0, pieces * piece, piece):
             recorder(Acquired(1, Block(first, _counts(piece, 3)), np.zeros(piece), time=first / 1e4))
         recorder.close("completed")
         with open_datafile(path) as record:
-            tracemalloc.start()
+            # the first one loads the libraries
+            if number:
+                tracemalloc.start()
             format.export(record, path, to, tmp_path / f"{number}")
             peaks.append(tracemalloc.get_traced_memory()[1])
             tracemalloc.stop()
-    # the first one has loaded the libraries
     assert peaks[2] < 1.5 * peaks[1]

@@ -5,6 +5,7 @@ from math import inf
 from pathlib import Path
 
 import pytest
+from pyqtgraph import GraphicsView, PlotItem
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
@@ -57,6 +58,19 @@ class ScriptedClient:
         return said
 
 
+_show_grid = PlotItem.showGrid
+
+
+@pytest.fixture(scope="package", autouse=True)
+def _plots_have_no_grid() -> Generator[None]:
+    """No test here looks at its lines, and Qt draws lines that are nearly transparent slowly: they take most of the
+    time of a page with plots. The windows of `pixels` are those of another process; see also `grids`.
+    """
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(PlotItem, "showGrid", lambda *_given, **_options: None)
+        yield
+
+
 @pytest.fixture(scope="package", autouse=True)
 def _the_shared_window_is_closed() -> Generator[None]:
     yield
@@ -106,3 +120,16 @@ def window(qtbot: QtBot, qapp: QApplication, tmp_path: Path) -> Generator[Window
     yield shown
     qapp.removeEventFilter(key)
     SHARED.give_back()
+
+
+@pytest.fixture
+def grids(window: Window) -> Generator[None]:
+    """For a test that measures how long the Run page takes: it is drawn as a person sees it."""
+    views = window.run.findChildren(GraphicsView)
+    plots = [item for view in views for item in view.scene().items() if isinstance(item, PlotItem)]
+    assert plots
+    for plot in plots:
+        _show_grid(plot, x=True, y=True, alpha=0.25)
+    yield
+    for plot in plots:
+        _show_grid(plot, x=False, y=False)

@@ -34,6 +34,7 @@ def window(qtbot: QtBot, tmp_path: Path) -> Generator[Window]:
         shown.leave()
 
 
+@pytest.mark.usefixtures("forked")
 def test_its_form_its_run_and_its_live_number(window: Window, qtbot: QtBot, tmp_path: Path) -> None:
     page, run = window.protocol, window.run
     page.choice.setCurrentText("tone-sweep")

@@ -434,6 +434,7 @@ def test_a_flood_of_events_leaves_the_main_loop_free(
 
 @pytest.mark.milliseconds
 @pytest.mark.seconds
+@pytest.mark.usefixtures("grids")
 def test_stop_acts_during_a_flood_of_events(
     window: Window, driven: ScriptedClient, monkeypatch: pytest.MonkeyPatch, qtbot: QtBot
 ) -> None:

@@ -1,12 +1,10 @@
 """What the tests of the link share."""
 
-import sys
 from collections.abc import Generator
 
 import pytest
 
 from bench.app.catalogue import PROTOCOLS
-from tests.forked_sessions import ForkedSessions, forking
 from tests.installed import installed
 
 
@@ -16,10 +14,3 @@ def _shaking_is_installed(tmp_path_factory: pytest.TempPathFactory) -> Generator
     entry_points = {PROTOCOLS: {"shaking": "tests.bench.app.ipc.experiment:SHAKING"}}
     with installed(tmp_path_factory.mktemp("shaking"), "rockbench-shaking", entry_points):
         yield
-
-
-@pytest.fixture
-def forked(forked_sessions: ForkedSessions, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Sessions that a test starts are forked, which saves it the second that a session takes to load the program."""
-    if sys.platform != "win32":
-        monkeypatch.setattr("bench.app.ipc.client.subprocess", forking(forked_sessions.link))

@@ -20,6 +20,7 @@ from bench.document.document import Document, Picture, Section, Table
 from protocols.harmonic.report_cycles import PERIODS, SAMPLES, Dwells
 from sim.gain import predict_gain
 
+pytestmark = pytest.mark.usefixtures("shared_results", "no_figures")
 SHORT = ["--omega", "20", "--beta", "0.25", "--starts", "1", "--ramp-time", "2", "--measured-cycles", "8"]
 LOOSE = ["--settle-tolerance", "0.01", "--amplitude-tolerance", "0.01"]
 
