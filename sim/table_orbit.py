@@ -147,12 +147,15 @@ class TablePeriod:
         self._decay = exp(-self._tick / shaker.amplifier_lag) if shaker.amplifier_lag > 0.0 else 0.0
         # each command is held for a tick, so that its phase is that of the middle of the tick
         self._phase = np.asarray((np.arange(ticks) + 0.5) * (tau / ticks), dtype=np.float64)
+        self._harmonics = np.empty((ticks, 0), dtype=np.complex128)
         self._step: Array | None = None
 
     def commands(self, drive: NDArray[np.complex128]) -> Array:
         """Commands in the ticks of a period, shape (ticks,), from the complex harmonics `drive`, shape (H,)."""
-        orders = np.arange(1, drive.size + 1)
-        return np.ascontiguousarray((np.exp(1j * np.outer(self._phase, orders)) @ drive).real)
+        if self._harmonics.shape[1] != drive.size:
+            # the same in all periods of an orbit
+            self._harmonics = np.exp(1j * np.outer(self._phase, np.arange(1, drive.size + 1)))
+        return np.ascontiguousarray((self._harmonics @ drive).real)
 
     def output(self, commands: Array) -> float:
         """Output of the amplifier at the end of the last of many periods with these `commands`, shape (ticks,): their
