@@ -72,7 +72,7 @@ def played(outcomes: list[Outcome]) -> list[Played]:
 @pytest.mark.parametrize("block", [1, 64, 100, 2000])
 def test_row_i_is_what_sample_i_did_whatever_block_and_lead(block: int, lead: int) -> None:
     # blocks of one sample are many
-    rig, volts = rig_that(lead), burst(311 if block == 1 else 1537)
+    rig, volts = rig_that(lead), burst(151 if block == 1 else 1537)
     watched: list[Array] = []
     ending, outcomes = Bench(rig, block).run(Arm(0.2), Play(volts, watched.append), Play(-volts), RampOut())
     assert ending.status == "completed"
