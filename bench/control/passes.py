@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -127,8 +128,12 @@ class SpectrumCheck:
         """The spectra are compared over the `band` of periods [s] and at single `periods` [s]."""
         self._dt = 1.0 / sample_rate
         self._periods = np.concatenate((logarithmic_periods(*band), np.array(periods)))
-        self._last = target, pseudo_acceleration(target, self._dt, self._periods, DAMPING)
-        self._target_spectrum = self._last[1]
+        self._target, self._last = target, (np.empty(0), np.empty(0))
+
+    @cached_property
+    def _target_spectrum(self) -> Array:
+        # not needed for a drive that is refused
+        return pseudo_acceleration(self._target, self._dt, self._periods, DAMPING)
 
     def error(self, achieved: Array) -> float:
         """Largest relative deviation of the response spectrum of `achieved` from that of the target."""
