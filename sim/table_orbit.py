@@ -7,7 +7,7 @@ such that the acceleration of the table is a sine.
 """
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from math import exp, tau
 
 import numpy as np
@@ -76,8 +76,28 @@ def table_orbit(fixed: Orbit, shaker: Shaker, harmonics: int = 5) -> TableOrbit:
 
     The drive contains the harmonics 1 to `harmonics`, of which the table's acceleration has only the fundamental, with
     the amplitude of `fixed`. Raises NoOrbit if Newton's method does not find the orbit, or the block comes to rest or
-    falls.
+    falls. Recent orbits are kept: parts of a run that need the same one share it, and its arrays cannot be written.
     """
+    return _found(_FixedOrbit(fixed), shaker, harmonics)
+
+
+class _FixedOrbit:
+    """An orbit on fixed ground, equal to another one with the same parameters and the same start, to the last bit."""
+
+    def __init__(self, orbit: Orbit) -> None:
+        self.orbit = orbit
+        self._key = orbit.specimen, orbit.omega, orbit.amplitude, orbit.phase, orbit.start
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _FixedOrbit) and self._key == other._key
+
+    def __hash__(self) -> int:
+        return hash(self._key)
+
+
+@lru_cache(maxsize=64)
+def _found(ground: _FixedOrbit, shaker: Shaker, harmonics: int) -> TableOrbit:
+    fixed = ground.orbit
     period = TablePeriod(fixed.specimen, shaker, fixed.omega)
     phase, start = _widest(fixed)
     orders: Array = np.arange(1.0, harmonics + 1.0)
@@ -96,6 +116,8 @@ def table_orbit(fixed: Orbit, shaker: Shaker, harmonics: int = 5) -> TableOrbit:
             jacobian = period.jacobian(start, drive)
             drift = float(np.abs(samples[:, 3] - samples[:, 2]).max())
             multipliers = np.linalg.eigvals(jacobian).astype(np.complex128)
+            for shared in (start, drive, found, multipliers):
+                shared.setflags(write=False)
             return TableOrbit(fixed.omega, phase, start, drive, found, multipliers, drift)
         drive = drive + error * response
     raise NoOrbit(
