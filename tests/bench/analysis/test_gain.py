@@ -163,7 +163,7 @@ def _of_steps(amplitudes: Sequence[float]) -> float:
     """Stated standard uncertainty of the peak [m] due to the resolution; laser 1 stands still, so that it adds none."""
     accuracy = EXACT.model_copy(update={"laser_resolution": STEP})
     seen = (_peak(1.0, swing=1e9).readings, steady_peak(_rounded(amplitudes, 0.0), 1.0).readings)
-    return float(_sensors(accuracy).drift_errors(seen, Draws(np.random.default_rng(1), 40_000))[STEPS][1].std())
+    return float(_sensors(accuracy).drift_errors(seen, Draws(np.random.default_rng(1), 10_000))[STEPS][1].std())
 
 
 @pytest.mark.parametrize("steps", [4, 20, 200, *(pytest.param(steps, marks=pytest.mark.soak) for steps in (8, 66))])
