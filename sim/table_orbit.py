@@ -78,26 +78,27 @@ def table_orbit(fixed: Orbit, shaker: Shaker, harmonics: int = 5) -> TableOrbit:
     the amplitude of `fixed`. Raises NoOrbit if Newton's method does not find the orbit, or the block comes to rest or
     falls. Recent orbits are kept: parts of a run that need the same one share it, and its arrays cannot be written.
     """
-    return _found(_FixedOrbit(fixed), shaker, harmonics)
+    return _found(_Sought(fixed, shaker, harmonics))
 
 
-class _FixedOrbit:
-    """An orbit on fixed ground, equal to another one with the same parameters and the same start, to the last bit."""
+class _Sought:
+    """Arguments of `table_orbit`, equal to others with the same parameters and the same start of the orbit."""
 
-    def __init__(self, orbit: Orbit) -> None:
-        self.orbit = orbit
-        self._key = orbit.specimen, orbit.omega, orbit.amplitude, orbit.phase, orbit.start
+    def __init__(self, fixed: Orbit, shaker: Shaker, harmonics: int) -> None:
+        self.fixed, self.shaker, self.harmonics = fixed, shaker, harmonics
+        orbit = fixed.specimen, fixed.omega, fixed.amplitude, fixed.phase, fixed.start
+        self._key = *orbit, shaker, harmonics
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, _FixedOrbit) and self._key == other._key
+        return isinstance(other, _Sought) and self._key == other._key
 
     def __hash__(self) -> int:
         return hash(self._key)
 
 
 @lru_cache(maxsize=64)
-def _found(ground: _FixedOrbit, shaker: Shaker, harmonics: int) -> TableOrbit:
-    fixed = ground.orbit
+def _found(sought: _Sought) -> TableOrbit:
+    fixed, shaker, harmonics = sought.fixed, sought.shaker, sought.harmonics
     period = TablePeriod(fixed.specimen, shaker, fixed.omega)
     phase, start = _widest(fixed)
     orders: Array = np.arange(1.0, harmonics + 1.0)

@@ -10,7 +10,7 @@ from bench.config.model import BenchConfiguration
 from bench.guard.shaker import Motion, ShakerModel, largest_repeated_mean
 from sim.channel import STOREYS
 from sim.linear import frame_matrices
-from sim.specimen import Frame, Specimen
+from sim.specimen import Specimen
 
 Array = NDArray[np.float64]
 
@@ -63,7 +63,9 @@ def resting_demands(
     # the table does not drift: no velocity and no displacement at zero frequency
     a[0] = 0.0
     x = -a / omega**2
-    u1, u2 = _storeys(specimen.frame, specimen.k_c, size, sample_rate) * a
+    matrices = np.array(frame_matrices(specimen.frame))
+    matrices[2, 0, 0] += specimen.k_c
+    u1, u2 = _storeys(matrices.tobytes(), size, sample_rate) * a
     ground = x if configuration.laser_reference == "ground" else 0.0 * x
     series = table_demands(x, 1j * omega * x, a, configuration.shaker_model)
     series |= laser_demands(u1 + ground, u2 + ground, u2 - u1, configuration.laser_half_ranges)
@@ -88,13 +90,12 @@ def _frequencies(size: int, sample_rate: float) -> Array:
 
 
 @lru_cache(maxsize=2)
-def _storeys(frame: Frame, k_c: float, size: int, sample_rate: float) -> NDArray[np.complex128]:
-    """u1 and u2 [m] per table acceleration [m/s2] at the `_frequencies`, shape (2, n), of a frame with the stiffness
-    `k_c` [N/m] of the spring to a resting block. The motions of a plan have the same frequencies.
+def _storeys(matrices: bytes, size: int, sample_rate: float) -> NDArray[np.complex128]:
+    """u1 and u2 [m] per table acceleration [m/s2] at the `_frequencies`, shape (2, n), from the matrices of mass,
+    damping and stiffness, the last with the spring to a resting block. The motions of a plan have the same frequencies.
     """
     omega = _frequencies(size, sample_rate)
-    mass, damping, stiffness = frame_matrices(frame)
-    stiffness[0, 0] += k_c
+    mass, damping, stiffness = np.frombuffer(matrices).reshape(3, 2, 2)
     w = omega[:, None, None]
     dynamic = stiffness - w**2 * mass + 1j * w * damping
     push = np.broadcast_to(-np.diag(mass)[:, None], (omega.size, 2, 1))

@@ -128,7 +128,7 @@ def _unit_motions(
     bench, and a plan is often repeated with others.
     """
     orders = np.frombuffer(lines, dtype=np.int64)
-    frequency = orders * (sample_rate / samples)
+    frequency: Array = orders.astype(np.float64) * (sample_rate / samples)
     amplitudes = drive_amplitudes(frequency, np.ones(frequency.size), "displacement", corner)
     random = np.random.default_rng(seed)
     made = [multisine(orders, amplitudes, samples, sample_rate, random) for _ in range(realisations)]
