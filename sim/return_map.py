@@ -10,7 +10,9 @@ to many points at once: q has shape (n, 18), x shape (n, 6).
 """
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
+from functools import lru_cache
 from math import pi, prod, tau
 from typing import Literal
 
@@ -230,7 +232,7 @@ def follow(origin: Floats, x: Floats, target: Floats) -> tuple[Solution | None, 
     does not. Returns None if they become too short. The second value is the largest derivative, relative to the scales
     of x, at the last fixed point that was found.
     """
-    solution = newton(origin[None], x[None]).one(0)
+    solution = _at(origin.tobytes(), x.tobytes())
     if solution is None:
         return None, 0.0
     span = target - origin
@@ -255,6 +257,24 @@ def follow(origin: Floats, x: Floats, target: Floats) -> tuple[Solution | None, 
     return solution, _steepness(target, solution)
 
 
+def follow_each(origin: Floats, x: Floats, targets: Floats) -> list[Solution | None]:
+    """Find the fixed points for the parameters in each row of `targets`, shape (n, 18), as `follow` does for one.
+
+    The first steps, which usually reach the targets, are taken together.
+    """
+    start = _at(origin.tobytes(), x.tobytes())
+    if start is None:
+        return [None] * len(targets)
+    together = newton(targets, np.tile(start.section, (len(targets), 1)))
+    return [together.one(i) or follow(origin, x, target)[0] for i, target in enumerate(targets)]
+
+
+@lru_cache(maxsize=64)
+def _at(origin: bytes, x: bytes) -> Solution | None:
+    """Fixed point near `x` for the parameters `origin`, both as bytes: many paths begin at the same point."""
+    return newton(np.frombuffer(origin)[None], np.frombuffer(x)[None]).one(0)
+
+
 def _steepness(q: Floats, solution: Solution) -> float:
     return float(_growth(q[None], solution.jacobian[None])[0])
 
@@ -272,7 +292,9 @@ def _solved(matrices: Floats, right: Floats) -> Floats:
     """Solutions of linear systems, shape (n, 6); NaN where a matrix is singular or not finite."""
     solution = np.full(right.shape, np.nan)
     finite = np.flatnonzero(np.isfinite(matrices).all(axis=(1, 2)))
+    with suppress(np.linalg.LinAlgError):
+        solution[finite] = np.linalg.solve(matrices[finite], right[finite][..., None])[..., 0]
+        return solution
     usable = finite[np.linalg.det(matrices[finite]) != 0.0]
-    if usable.size:
-        solution[usable] = np.linalg.solve(matrices[usable], right[usable][..., None])[..., 0]
+    solution[usable] = np.linalg.solve(matrices[usable], right[usable][..., None])[..., 0]
     return solution

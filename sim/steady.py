@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from sim.errors import InvalidInput, RockbenchError
 from sim.excitation import SineProgram, Sweep
 from sim.linear import frame_matrices, steady_peaks, steady_response
-from sim.return_map import MOST_KNOWN, STEEP, Solution, extrapolated, follow, newton, parameters
+from sim.return_map import MOST_KNOWN, STEEP, Solution, extrapolated, follow, follow_each, newton, parameters
 from sim.rocking import Peaks, State, simulate
 from sim.specimen import Specimen
 
@@ -112,11 +112,30 @@ def rocking_orbit(specimen: Specimen, omega: float, amplitude: float, guess: Orb
     requested parameters.
     """
     check_steady(specimen, omega, amplitude)
-    if guess is not None and guess.branch == "rocking":
-        origin, section = parameters(guess.specimen, guess.omega, guess.amplitude)[0], guess.section
-    else:
-        origin, section = _seed()
+    origin, section = _origin(guess)
     return _orbit(specimen, omega, amplitude, _followed(origin, section, specimen, omega, amplitude))
+
+
+def rocking_orbits(
+    specimens: Sequence[Specimen], omega: float, amplitudes: Sequence[float], guess: Orbit
+) -> list[Orbit | None]:
+    """Rocking orbits of several specimens at `omega` [rad/s], each with its own amplitude [m/s2], by continuation from
+    `guess` as in `rocking_orbit`; None where the continuation does not reach the orbit.
+
+    Raises InvalidInput as `rocking_orbit` does.
+    """
+    cases = list(zip(specimens, amplitudes, strict=True))
+    for case in cases:
+        check_steady(case[0], omega, case[1])
+    if not cases:
+        return []
+    origin, section = _origin(guess)
+    targets = np.concatenate([parameters(specimen, omega, amplitude) for specimen, amplitude in cases])
+    found = follow_each(origin, section, targets)
+    return [
+        None if solution is None else _orbit(specimen, omega, amplitude, solution)
+        for (specimen, amplitude), solution in zip(cases, found, strict=True)
+    ]
 
 
 def rocking_branch(specimen: Specimen, omegas: Sequence[float] | NDArray[np.float64], amplitude: float) -> list[Orbit]:
@@ -209,6 +228,13 @@ def check_steady(specimen: Specimen, omega: float, amplitude: float) -> None:
         raise InvalidInput("omega", omega, "it must be a positive circular frequency in rad/s")
     if not (isfinite(amplitude) and amplitude > 0.0):
         raise InvalidInput("amplitude", amplitude, "it must be a positive acceleration in m/s2")
+
+
+def _origin(guess: Orbit | None) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Parameters and section from which a continuation starts."""
+    if guess is not None and guess.branch == "rocking":
+        return parameters(guess.specimen, guess.omega, guess.amplitude)[0], guess.section
+    return _seed()
 
 
 def _seed() -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -7,7 +7,7 @@ such that the acceleration of the table is a sine.
 """
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from math import exp, tau
 
 import numpy as np
@@ -76,8 +76,29 @@ def table_orbit(fixed: Orbit, shaker: Shaker, harmonics: int = 5) -> TableOrbit:
 
     The drive contains the harmonics 1 to `harmonics`, of which the table's acceleration has only the fundamental, with
     the amplitude of `fixed`. Raises NoOrbit if Newton's method does not find the orbit, or the block comes to rest or
-    falls.
+    falls. Recent orbits are kept: parts of a run that need the same one share it, and its arrays cannot be written.
     """
+    return _found(_Sought(fixed, shaker, harmonics))
+
+
+class _Sought:
+    """Arguments of `table_orbit`, equal to others with the same parameters and the same start of the orbit."""
+
+    def __init__(self, fixed: Orbit, shaker: Shaker, harmonics: int) -> None:
+        self.fixed, self.shaker, self.harmonics = fixed, shaker, harmonics
+        orbit = fixed.specimen, fixed.omega, fixed.amplitude, fixed.phase, fixed.start
+        self._key = *orbit, shaker, harmonics
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Sought) and self._key == other._key
+
+    def __hash__(self) -> int:
+        return hash(self._key)
+
+
+@lru_cache(maxsize=64)
+def _found(sought: _Sought) -> TableOrbit:
+    fixed, shaker, harmonics = sought.fixed, sought.shaker, sought.harmonics
     period = TablePeriod(fixed.specimen, shaker, fixed.omega)
     phase, start = _widest(fixed)
     orders: Array = np.arange(1.0, harmonics + 1.0)
@@ -96,6 +117,8 @@ def table_orbit(fixed: Orbit, shaker: Shaker, harmonics: int = 5) -> TableOrbit:
             jacobian = period.jacobian(start, drive)
             drift = float(np.abs(samples[:, 3] - samples[:, 2]).max())
             multipliers = np.linalg.eigvals(jacobian).astype(np.complex128)
+            for shared in (start, drive, found, multipliers):
+                shared.setflags(write=False)
             return TableOrbit(fixed.omega, phase, start, drive, found, multipliers, drift)
         drive = drive + error * response
     raise NoOrbit(
@@ -147,12 +170,15 @@ class TablePeriod:
         self._decay = exp(-self._tick / shaker.amplifier_lag) if shaker.amplifier_lag > 0.0 else 0.0
         # each command is held for a tick, so that its phase is that of the middle of the tick
         self._phase = np.asarray((np.arange(ticks) + 0.5) * (tau / ticks), dtype=np.float64)
+        self._harmonics = np.empty((ticks, 0), dtype=np.complex128)
         self._step: Array | None = None
 
     def commands(self, drive: NDArray[np.complex128]) -> Array:
         """Commands in the ticks of a period, shape (ticks,), from the complex harmonics `drive`, shape (H,)."""
-        orders = np.arange(1, drive.size + 1)
-        return np.ascontiguousarray((np.exp(1j * np.outer(self._phase, orders)) @ drive).real)
+        if self._harmonics.shape[1] != drive.size:
+            # the same in all periods of an orbit
+            self._harmonics = np.exp(1j * np.outer(self._phase, np.arange(1, drive.size + 1)))
+        return np.ascontiguousarray((self._harmonics @ drive).real)
 
     def output(self, commands: Array) -> float:
         """Output of the amplifier at the end of the last of many periods with these `commands`, shape (ticks,): their

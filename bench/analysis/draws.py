@@ -28,9 +28,9 @@ class SharedDraws(Draws):
 
     def __init__(self, seed: int, n: int) -> None:
         super().__init__(np.random.default_rng(seed), n)
-        self._seed = seed
         self._asked: tuple[tuple[str, tuple[Any, ...]], ...] = ()
         self._kept: dict[object, Array] = {}
+        self._states: dict[object, Any] = {(): self._random.bit_generator.state}
 
     def again(self) -> "SharedDraws":
         """Restart the draws from the first one. Returns this object."""
@@ -44,10 +44,12 @@ class SharedDraws(Draws):
         return self._repeated("standard_normal", (*rows, self.n))
 
     def _repeated(self, kind: str, *arguments: Any) -> Array:
-        self._asked += ((kind, arguments),)
-        if self._asked not in self._kept:
+        before = self._asked
+        self._asked = asked = (*before, (kind, arguments))
+        if asked not in self._kept:
             # the calls differ from the earlier ones: for example, a zero at rest needs draws that a mean over a cycle
-            # does not need
-            random = np.random.default_rng(self._seed)
-            self._kept[self._asked] = [getattr(random, name)(*given) for name, given in self._asked][-1]
-        return self._kept[self._asked]
+            # does not need; they go on from the last call that was the same
+            self._random.bit_generator.state = self._states[before]
+            self._kept[asked] = getattr(self._random, kind)(*arguments)
+            self._states[asked] = self._random.bit_generator.state
+        return self._kept[asked]

@@ -279,10 +279,10 @@ def _powers(n: int, values: Array) -> Complex:
 
 def _columns(powers: Complex) -> Array:
     """Basis of the series, shape (n, 1 + 2 pairs): a constant, and the real and imaginary parts of the `powers`."""
-    n = powers.shape[0]
-    return np.concatenate(
-        (np.ones((n, 1)), np.stack((np.real(powers), np.imag(powers)), axis=2).reshape(n, -1)), axis=1
-    )
+    n, pairs = powers.shape
+    columns = np.ones((n, 1 + 2 * pairs))
+    columns[:, 1::2], columns[:, 2::2] = powers.real, powers.imag
+    return columns
 
 
 def _left(series: Array, values: Array) -> Array:

@@ -16,6 +16,7 @@ corrected motion.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from math import ceil, log2, pi, tau
 
 import numpy as np
@@ -153,6 +154,17 @@ def _amplitudes(step: float, smoothing: Array) -> Array:
     return step / pi * (-1.0) ** _ORDERS / _ORDERS * np.exp(-2.0 * pi**2 * np.outer(smoothing**2, _ORDERS**2))
 
 
+@lru_cache(maxsize=4)
+def _left_over(kept: int, fitted: int) -> Complex:
+    """Mean of each harmonic -`kept` to `kept` in each of `_BINS` intervals of the phase, shape (2 kept + 1, bins); zero
+    for those that are `fitted`. The estimations of a measurement have these in common.
+    """
+    orders = np.arange(-kept, kept + 1, dtype=np.float64)
+    centres = (np.arange(float(_BINS)) + 0.5) * (tau / _BINS)
+    beyond = np.where(np.abs(orders) > fitted, np.sinc(orders / _BINS), 0.0)
+    return np.exp(1j * np.outer(orders, centres)) * beyond[:, None]
+
+
 @dataclass(frozen=True, eq=False)
 class _Fit:
     """Fitted `motion`, complex amplitudes [m] of shape (1 + H,) of readings Re(sum of c_k exp(j k phase)), and the mean
@@ -225,9 +237,7 @@ class _Fit:
     def judged(self, sawtooth: _Sawtooth) -> _Judged:
         """Means over all hypotheses, weighted by the likelihoods of the residual."""
         orders = sawtooth.orders
-        centres = (np.arange(float(_BINS)) + 0.5) * (tau / _BINS)
-        beyond = np.where(np.abs(orders) > sawtooth.fitted, np.sinc(orders / _BINS), 0.0)
-        waves = sawtooth.spectra @ (np.exp(1j * np.outer(orders, centres)) * beyond[:, None])
+        waves = sawtooth.spectra @ _left_over(orders.size // 2, sawtooth.fitted)
         terms = _amplitudes(self.step, _SMOOTHING)[:, None, :] * _TURNS
         upper, lower = (np.imag(terms @ waves[:, half]) for half in (0, 1))
         weighed = self.weights * self.residual

@@ -22,7 +22,7 @@ from sim.ensemble import simulate_many
 from sim.knowledge import SpecimenKnowledge
 from sim.rocking import Motion, Status
 from sim.specimen import Specimen
-from sim.steady import NoOrbit, Orbit, rocking_orbit
+from sim.steady import Orbit, rocking_orbits
 
 Counts = NDArray[np.float64]
 
@@ -225,19 +225,12 @@ def _best_candidates(
 def _cases(
     specimens: Sequence[Specimen], omega: float, amplitude: float, orbit: Orbit | None, random: np.random.Generator
 ) -> list[_Case]:
-    found: list[_Case] = []
-    for specimen in specimens:
-        drive = 1.0 + DRIVE * float(random.uniform(-1.0, 1.0))
-        own = None if orbit is None else _own_orbit(specimen, omega, drive * amplitude, orbit)
-        found.append(_Case(specimen, drive, own))
-    return found
-
-
-def _own_orbit(specimen: Specimen, omega: float, amplitude: float, guess: Orbit) -> Orbit | None:
-    try:
-        return rocking_orbit(specimen, omega, amplitude, guess=guess)
-    except NoOrbit:
-        return None
+    drives = [1.0 + DRIVE * float(random.uniform(-1.0, 1.0)) for _ in specimens]
+    amplitudes = [drive * amplitude for drive in drives]
+    own: list[Orbit | None] = [None] * len(drives)
+    if orbit is not None:
+        own = rocking_orbits(specimens, omega, amplitudes, orbit)
+    return [_Case(*each) for each in zip(specimens, drives, own, strict=True)]
 
 
 def _successes(ways: Sequence[Candidate], cases: Sequence[_Case]) -> Counts:

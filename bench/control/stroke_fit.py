@@ -164,6 +164,7 @@ def fit_stroke(
         changed = float(np.sqrt(np.mean((fitted - original) ** 2) / np.mean(original**2)))
         where = "below 2 Hz" if band is None else f"within {band[0]:g} to {band[1]:g} Hz"
         done = f"least change {where}: {100.0 * changed:.3g} % of the record's rms acceleration"
+    spectrum = pseudo_acceleration(original, dt, periods, damping)
     return StrokeFit(
         record=SampledRecord(fitted, dt),
         lead=lead * dt,
@@ -171,8 +172,8 @@ def fit_stroke(
         before=before,
         after=table_motion(fitted, dt),
         periods=periods,
-        spectrum_before=pseudo_acceleration(original, dt, periods, damping),
-        spectrum=pseudo_acceleration(fitted, dt, periods, damping),
+        spectrum_before=spectrum,
+        spectrum=spectrum if fitted is original else pseudo_acceleration(fitted, dt, periods, damping),
     )
 
 

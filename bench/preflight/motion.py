@@ -1,6 +1,7 @@
 """Demands of a table motion on table, shaker, lasers and a resting block."""
 
 from collections.abc import Mapping
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,12 +58,14 @@ def resting_demands(
     from scipy.fft import next_fast_len
 
     size = next_fast_len(acceleration.size + round(_SILENCE * sample_rate), real=True)
-    omega: Array = 2.0 * np.pi * np.fft.rfftfreq(size, 1.0 / sample_rate).astype(np.float64)
+    omega = _frequencies(size, sample_rate)
     a = np.fft.rfft(acceleration, size)
     # the table does not drift: no velocity and no displacement at zero frequency
-    a[0], omega[0] = 0.0, 1.0
+    a[0] = 0.0
     x = -a / omega**2
-    u1, u2 = _storeys(specimen, omega) * a
+    matrices = np.array(frame_matrices(specimen.frame))
+    matrices[2, 0, 0] += specimen.k_c
+    u1, u2 = _storeys(matrices.tobytes(), size, sample_rate) * a
     ground = x if configuration.laser_reference == "ground" else 0.0 * x
     series = table_demands(x, 1j * omega * x, a, configuration.shaker_model)
     series |= laser_demands(u1 + ground, u2 + ground, u2 - u1, configuration.laser_half_ranges)
@@ -79,12 +82,20 @@ def resting_demands(
     return found
 
 
-def _storeys(specimen: Specimen, omega: Array) -> NDArray[np.complex128]:
-    """u1 and u2 [m] per table acceleration [m/s2] at `omega` [rad/s], shape (2, n); with a block, valid while the block
-    rests.
+def _frequencies(size: int, sample_rate: float) -> Array:
+    """Circular frequencies [rad/s] of `numpy.fft.rfft`, shape (size // 2 + 1,); the first is 1 instead of zero."""
+    omega: Array = 2.0 * np.pi * np.fft.rfftfreq(size, 1.0 / sample_rate).astype(np.float64)
+    omega[0] = 1.0
+    return omega
+
+
+@lru_cache(maxsize=2)
+def _storeys(matrices: bytes, size: int, sample_rate: float) -> NDArray[np.complex128]:
+    """u1 and u2 [m] per table acceleration [m/s2] at the `_frequencies`, shape (2, n), from the matrices of mass,
+    damping and stiffness, the last with the spring to a resting block. The motions of a plan have the same frequencies.
     """
-    mass, damping, stiffness = frame_matrices(specimen.frame)
-    stiffness[0, 0] += specimen.k_c
+    omega = _frequencies(size, sample_rate)
+    mass, damping, stiffness = np.frombuffer(matrices).reshape(3, 2, 2)
     w = omega[:, None, None]
     dynamic = stiffness - w**2 * mass + 1j * w * damping
     push = np.broadcast_to(-np.diag(mass)[:, None], (omega.size, 2, 1))

@@ -70,6 +70,7 @@ def predict_draws(
     scales = (1.0 + table_scale * np.random.default_rng(scale).standard_normal(n)).tolist()
     known = _Runs(bare, coupled)
     free = known.bare(specimen, bare.acceleration)
+    nominal = known.gains(specimen, coupled.acceleration, lambda: free)
 
     def chunk(first: int) -> list[tuple[float, float, float]]:
         runs = _Runs(bare, coupled)
@@ -81,13 +82,15 @@ def predict_draws(
             random = np.random.default_rng(seeds[k])
             base, moved = bare.draw(random, scales[k]), coupled.draw(random, scales[k])
             return runs.gains(member, moved.acceleration, lambda: runs.bare(member, base.acceleration))
+        if scales[k] == 1.0 and member == specimen:
+            # a contribution without uncertainty
+            return nominal
         moved = scales[k] * coupled.acceleration
         if member.frame == specimen.frame:
             return runs.gains(member, moved, lambda: _scaled(free, scales[k]))
         return runs.gains(member, moved, lambda: runs.bare(member, scales[k] * bare.acceleration))
 
     found = np.array([row for rows in in_threads(chunk, range(0, n, CHUNK)) for row in rows]).reshape(n, 3)
-    nominal = known.gains(specimen, coupled.acceleration, lambda: free)
     return Predicted(nominal[:2], found[:, 0], found[:, 1], found[np.isnan(found[:, 1]), 2])
 
 

@@ -1,5 +1,7 @@
 """Members side by side in lanes have the bits of single runs, whatever their neighbours do."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -71,7 +73,7 @@ def test_a_member_that_fails_ends_alone() -> None:
 def test_without_compilation_the_series_is_the_same_to_rounding() -> None:
     n, p, row = 12, Specimen(beta=0.64).packed(), np.array([1.0, 1.2, 0.1, 0.0, 0.0, 0.3, 17.0, 0.2, 0.0, 0.0])
     found: list[np.ndarray] = []
-    compiled = recurrences.forcing, recurrences.rocking, recurrences.resting
+    compiled: list[Any] = [recurrences.forcing, recurrences.rocking, recurrences.resting]
     for forcing, rocking, resting in (compiled, [each.py_func for each in compiled]):
         a, c, r, w = np.zeros(n + 1), np.zeros((6, n + 1)), np.zeros((6, n + 1)), np.zeros((WORK_ROWS, n + 1))
         c[:, 0] = 0.003, 0.004, 0.05, -0.08, -0.02, -0.3

@@ -12,7 +12,7 @@ from tests.benchmarks.stress import run_chunk, shares, table
 from tests.benchmarks.stress_audit import audit
 from tests.benchmarks.stress_cases import KINDS, Case
 
-CASES, SEED = 4000, 20
+CASES, SEED = 3000, 20
 
 
 @pytest.mark.parametrize("kind", list(KINDS))

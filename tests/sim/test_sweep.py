@@ -5,6 +5,7 @@ import socket
 import sys
 import threading
 import warnings
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,7 @@ from sim.outcomes import outcome_map
 from sim.specimen import Specimen
 from sim.steady import rocking_orbit
 from sim.sweep import SchedulerUnavailable, connection, in_threads, processors, sweep
+from tests.forked import FORKS
 from tests.patience import LONG
 from tests.sim.runs import A_S
 
@@ -70,16 +72,26 @@ def test_a_scheduler_that_is_not_there_is_named(monkeypatch: pytest.MonkeyPatch)
         sweep(inverse, [1], address)
 
 
+LOADED = ["distributed", "sim.gain", "sim.maps", "sim.outcomes", "sim.kernel.members", "sim.kernel.rocking"]
+"""What the workers need: each would take more than a second of processor time to import it."""
+
+
 @pytest.fixture(scope="module")
 def cluster() -> Any:
+    """Two workers, forked from a process that has imported what they need; where there is no fork, they do it."""
     distributed = pytest.importorskip("distributed", reason="dask.distributed is not installed (extra: distributed)")
+    method = "forkserver" if FORKS else "spawn"
     with (
         warnings.catch_warnings(),
-        distributed.LocalCluster(
-            n_workers=2, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0", host="127.0.0.1"
-        ) as two_workers,
+        import_module("dask").config.set({"distributed.worker.multiprocessing-method": method}),
     ):
-        yield two_workers
+        context = import_module("distributed.utils").get_mp_context()
+        if FORKS:
+            context.set_forkserver_preload(LOADED)
+        with distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0", host="127.0.0.1"
+        ) as two_workers:
+            yield two_workers
 
 
 def test_a_scheduler_s_workers_do_the_work(cluster: Any) -> None:

@@ -15,7 +15,7 @@ from sim.steady import Orbit, rocking_orbit
 from sim.table_orbit import SUBSTEPS, TICKS, NoOrbit, TableOrbit, TablePeriod, corner, table_orbit
 
 AMPLITUDE = 1.01 * Specimen().uplift_acceleration
-WINDOW = 130
+WINDOW = 100
 UNLIMITED = {"voltage_limit": 1e12, "current_limit": 1e12}
 
 

@@ -65,7 +65,8 @@ class Response:
         first = (turn - 1.0) / z
         second = (turn - 1.0 - z) / z**2
         q = np.zeros((2, x.size), np.complex128)
-        for mode in range(2):
+        # a locked table does not push
+        for mode in range(2) if x.any() else ():
             taps = self.push[mode] * h * np.array([second[mode], first[mode] - second[mode]])
             # the first sample has no segment of the interpolated motion before it
             q[mode] = lfilter(taps, [1.0, -turn[mode]], x, zi=-taps[:1] * x[0])[0]

@@ -75,13 +75,15 @@ def _impact(times: Array, angle: Array, guess: float, window: float) -> tuple[fl
     [s].
     """
     instant, uncertainty = guess, np.nan
-    for _ in range(3):
-        instant, uncertainty = _closer(times, angle, instant, window)
+    for last in (False, False, True):
+        instant, uncertainty = _closer(times, angle, instant, window, judged=last)
     return instant, uncertainty
 
 
-def _closer(times: Array, angle: Array, instant: float, window: float) -> tuple[float, float]:
-    """One step towards the zero of the cubic, from an `instant` near it; NaN if too few samples remain."""
+def _closer(times: Array, angle: Array, instant: float, window: float, *, judged: bool) -> tuple[float, float]:
+    """One step towards the zero of the cubic, from an `instant` near it; NaN if too few samples remain. The uncertainty
+    is NaN unless it is `judged`.
+    """
     if not np.isfinite(instant):
         return np.nan, np.nan
     low, high = np.searchsorted(times, (instant - window, instant + window + AFTER))
@@ -94,8 +96,10 @@ def _closer(times: Array, angle: Array, instant: float, window: float) -> tuple[
     inverse: Array = np.asarray(np.linalg.pinv(basis), dtype=np.float64)
     fitted = inverse @ angle[used]
     slope = float(fitted[1]) / window
-    spread = functional_uncertainty(inverse[0], angle[used] - basis @ fitted, basis.shape[1])
-    return instant - float(fitted[0]) / slope, spread / abs(slope)
+    nearer = instant - float(fitted[0]) / slope
+    if not judged:
+        return nearer, np.nan
+    return nearer, functional_uncertainty(inverse[0], angle[used] - basis @ fitted, basis.shape[1]) / abs(slope)
 
 
 def _turn(times: Array, angle: Array, crossing: float, length: float) -> tuple[float, float]:

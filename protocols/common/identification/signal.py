@@ -3,6 +3,7 @@ block, and their drive.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 from math import ceil, log
 
 import numpy as np
@@ -115,14 +116,23 @@ def required_motions(parameters: IdentifyParameters, lines: Grid) -> list[Comple
     """Complex amplitudes of the table's acceleration at the lines, shape (n_lines,), for each realisation; every motion
     has a peak of 1 m/s2.
     """
-    frequency = lines.frequency
-    amplitudes = drive_amplitudes(frequency, np.ones(frequency.size), "displacement", parameters.corner)
-    random = np.random.default_rng(parameters.phase_seed)
-    made = [
-        multisine(lines.lines, amplitudes, lines.samples, lines.sample_rate, random)
-        for _ in range(parameters.realisations)
-    ]
-    return [each.scaled_to(1.0, np.ones(frequency.size)).spectrum for each in made]
+    asked = parameters.corner, parameters.phase_seed, parameters.realisations
+    return [*_unit_motions(lines.lines.tobytes(), lines.samples, lines.sample_rate, *asked)]
+
+
+@lru_cache(maxsize=8)
+def _unit_motions(
+    lines: bytes, samples: int, sample_rate: float, corner: float, seed: int, realisations: int
+) -> tuple[Complex, ...]:
+    """`required_motions` at the `lines` of a period of `samples` samples. They do not depend on the limits of the
+    bench, and a plan is often repeated with others.
+    """
+    orders = np.frombuffer(lines, dtype=np.int64)
+    frequency: Array = orders.astype(np.float64) * (sample_rate / samples)
+    amplitudes = drive_amplitudes(frequency, np.ones(frequency.size), "displacement", corner)
+    random = np.random.default_rng(seed)
+    made = [multisine(orders, amplitudes, samples, sample_rate, random) for _ in range(realisations)]
+    return tuple(each.scaled_to(1.0, np.ones(frequency.size)).spectrum for each in made)
 
 
 def drive_for(motion: Complex, response: Complex, grid: Grid, knee: float) -> Complex:

@@ -64,13 +64,18 @@ def table() -> tuple[Array, Array]:
     return x, a
 
 
+@cache
+def moved_by_table(c: Constants) -> Array:
+    """Relative displacements of the storeys, shape (n, 2), by scipy's own first-order hold with matrix exponentials."""
+    _, moved, _ = signal.lsim((*system(c), np.eye(4), np.zeros((4, 1))), table()[1], TIME)
+    moved.setflags(write=False)
+    return moved[:, :2]
+
+
 def recording(c: Constants, *, lag: float = 6e-4, bend: float = 2.0, on_table: bool = False) -> Array:
     """Signals of a perfect bench with imperfect lasers, shape (n, 6)."""
     x, a = table()
-    matrices = system(c)
-    # scipy's own first-order hold, by matrix exponentials
-    _, moved, _ = signal.lsim((*matrices, np.eye(4), np.zeros((4, 1))), a, TIME)
-    seen = moved[:, :2] + (0.0 if on_table else x[:, None])
+    seen = moved_by_table(c) + (0.0 if on_table else x[:, None])
     late = np.column_stack([np.interp(TIME - lag, TIME, one) for one in seen.T])
     gains, offsets = np.array([1.002, 0.997]), np.array([1e-4, -2e-4])
     signals = np.zeros((TIME.size, 6))
@@ -225,7 +230,7 @@ def released(c: Constants, drag: float = 0.0) -> Array:
         return found
 
     after = TIME[TIME >= 3.0] - 3.0
-    found = solve_ivp(rates, (0.0, after[-1]), [*pull, 0.0, 0.0], t_eval=after, rtol=1e-10, atol=1e-13)
+    found = solve_ivp(rates, (0.0, after[-1]), [*pull, 0.0, 0.0], "DOP853", t_eval=after, rtol=1e-10, atol=1e-13)
     moved = np.concatenate((np.tile(pull, (TIME.size - after.size, 1)), found.y[:2].T))
     signals = np.zeros((TIME.size, 6))
     signals[:, 4:6] = moved - pull + 3e-6 * np.random.default_rng(1).standard_normal(moved.shape)

@@ -82,9 +82,10 @@ class Bench:
 def _fit(values: NDArray[np.float64], begin: int, end: int, omega: float, highest: int) -> Complex:
     """Amplitudes z_k of Im(z_k exp(i k omega n / RATE)) by least squares between two samples."""
     phase = omega / RATE * np.arange(begin, end)
-    angles = phase[:, None] * np.arange(1, highest + 1)
-    basis = np.concatenate((np.ones((phase.size, 1)), np.sin(angles), np.cos(angles)), axis=1)
-    fit = np.linalg.lstsq(basis, values[begin:end], rcond=None)[0][1:]
+    turns = np.exp(1j * phase[:, None] * np.arange(1, highest + 1))
+    basis = np.concatenate((np.ones((phase.size, 1)), turns.imag, turns.real), axis=1)
+    # over whole cycles the columns are almost orthogonal
+    fit = np.linalg.solve(basis.T @ basis, basis.T @ values[begin:end])[1:]
     return fit[:highest] + 1j * fit[highest:]
 
 
@@ -144,7 +145,9 @@ def _assert_as_asked(shares: Complex) -> None:
     assert distortion <= ASKED.distortion
 
 
-@pytest.mark.parametrize(("omega", "wrong"), [(12.5, 1.2), (16.0, 0.8), (20.0, 1.2)])
+@pytest.mark.parametrize(
+    ("omega", "wrong"), [(12.5, 1.2), (16.0, 0.8), pytest.param(20.0, 1.2, marks=pytest.mark.soak)]
+)
 def test_the_bare_frame_is_moved_as_asked_within_six_updates(omega: float, wrong: float) -> None:
     sine = Sine(omega, AMPLITUDE, _believed(2.1, wrong))
     shares, updates = _hold(None, sine, (Segment(4.0, AMPLITUDE, omega),), UPDATES + 3)
@@ -194,8 +197,18 @@ def test_the_table_is_moved_as_asked_through_the_impacts_within_six_updates(beta
         _assert_as_asked(held)
 
 
-@pytest.mark.parametrize(("beta", "omega"), FEW)
-@pytest.mark.parametrize(("wrong", "lag"), [(1.2, 0.0), (1.0, 0.002)])
+@pytest.mark.parametrize(
+    ("beta", "omega", "wrong", "lag"),
+    [
+        (0.25, 12.5, 1.2, 0.0),
+        (0.64, 20.0, 1.2, 0.0),
+        (0.97, 17.5, 1.0, 0.002),
+        *(
+            pytest.param(*case, marks=pytest.mark.soak)
+            for case in ((0.97, 17.5, 1.2, 0.0), (0.25, 12.5, 1.0, 0.002), (0.64, 20.0, 1.0, 0.002))
+        ),
+    ],
+)
 def test_harmonics_are_cancelled_where_their_response_is_misjudged(
     beta: float, omega: float, wrong: float, lag: float
 ) -> None:

@@ -40,7 +40,9 @@ def test_a_specimen_off_by_four_per_cent_is_captured_from_its_free_motion_and_he
     assert np.sqrt(np.mean(held.controls[-40:] ** 2)) < 2e-4
 
 
-@pytest.mark.parametrize("answer", [0.8, 1.25, np.exp(0.4j), np.exp(-0.4j)])
+@pytest.mark.parametrize(
+    "answer", [1.25, np.exp(-0.4j), *(pytest.param(other, marks=pytest.mark.soak) for other in (0.8, np.exp(0.4j)))]
+)
 def test_a_table_that_answers_otherwise_than_calibrated_is_held(
     windows: dict[tuple[float, float], CycleMap], answer: complex
 ) -> None:

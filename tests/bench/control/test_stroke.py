@@ -12,7 +12,7 @@ from bench.analysis.table_motion import table_motion, with_final_rest
 from bench.config.model import BenchConfiguration
 from bench.control import least_change
 from bench.control.least_change import Infeasible, SineModes, oscillator_peak, shortest
-from bench.control.stroke_fit import Method, StrokeFit, fit_stroke, high_passed, periods_of
+from bench.control.stroke_fit import PERIODS, Method, StrokeFit, fit_stroke, high_passed, periods_of
 from bench.control.target import Reach
 from sim.errors import InvalidInput
 from sim.excitation import SampledRecord
@@ -158,7 +158,7 @@ def test_the_fit_is_the_least_change_that_slsqp_finds(monkeypatch: pytest.Monkey
 
 
 @pytest.mark.parametrize("stroke", [0.075, 0.05, 0.03])
-@pytest.mark.parametrize("seed", [0, 2])
+@pytest.mark.parametrize("seed", [0, pytest.param(2, marks=pytest.mark.soak)])
 def test_the_least_change_does_at_most_half_the_harm_of_a_high_pass(seed: int, stroke: float) -> None:
     record, reach = SampledRecord(ground_motion(seed), 0.005), Reach(stroke, 0.6)
     periods = periods_of(Frame())
@@ -213,7 +213,7 @@ def test_a_record_of_five_minutes_fits() -> None:
     a = np.concatenate([ground_motion(seed, 38.0, 0.01) * scale for seed, scale in enumerate((1.0, *(0.3,) * 7))])
     record, reach = SampledRecord(a, 0.01), Reach(0.12, 0.6)
     assert record.duration > 300.0
-    good, simple = (fit_stroke(record, reach, method) for method in Method)
+    good, simple = (fit_stroke(record, reach, method, PERIODS[::2]) for method in Method)
     _within(good, reach)
     _within(simple, reach)
     assert np.linalg.norm(good.change) < 0.5 * np.linalg.norm(simple.change)
@@ -227,7 +227,7 @@ def test_the_high_pass_halves_its_corner_and_starts_early_enough() -> None:
     passed = high_passed(a, dt, corner)
     middle = slice(4000, 8000)
     shifted = passed.acceleration[passed.lead :][: a.size]
-    assert shifted[middle] == pytest.approx(0.5 * a[middle], abs=1e-3)
+    np.testing.assert_allclose(shifted[middle], 0.5 * a[middle], rtol=0.0, atol=1e-3)
 
 
 @pytest.mark.parametrize(

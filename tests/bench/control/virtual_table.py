@@ -2,12 +2,20 @@
 
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import signal as filters
 
-from bench.control.identification import band_lines, drive_amplitudes, identify_table, multisine, steady_periods
+from bench.control.identification import (
+    Multisine,
+    band_lines,
+    drive_amplitudes,
+    identify_table,
+    multisine,
+    steady_periods,
+)
 from bench.control.preparation import prepare
 from bench.control.table_model import TableModel
 from bench.control.target import Target
@@ -49,21 +57,28 @@ def identify(
     bench: VirtualBench, level: float = 0.6, period: float = 8.0, realisations: int = 3, periods: int = 3
 ) -> TableModel:
     """Identify the table with whatever stands on it, the first period left out, peaks of `level` [m/s2]."""
+    signals = _multisines(level, period, realisations)
+    drives: list[Array] = []
+    accelerations: list[Array] = []
+    for signal in signals:
+        drive = signal.drive(periods + 1)
+        drives.append(steady_periods(drive, signal.samples, 1))
+        accelerations.append(steady_periods(play(bench, drive).acceleration, signal.samples, 1))
+    return identify_table(
+        np.array(drives), np.array(accelerations), signals[0].lines, RATE, date=IDENTIFIED, specimen="as mounted"
+    )
+
+
+@cache
+def _multisines(level: float, period: float, realisations: int) -> list[Multisine]:
+    """Drives of an identification, which are the same for every bench."""
     samples = round(period * RATE)
     lines = band_lines(samples, RATE, (0.4, 80.0))
     prior = np.abs(Shaker().frequency_response(2.0 * np.pi * lines * RATE / samples))
     amplitudes = drive_amplitudes(lines * RATE / samples, prior, "displacement", 1.0)
     random = np.random.default_rng(5)
-    drives: list[Array] = []
-    accelerations: list[Array] = []
-    for _ in range(realisations):
-        signal = multisine(lines, amplitudes, samples, RATE, random, prior).scaled_to(level, prior)
-        drive = signal.drive(periods + 1)
-        drives.append(steady_periods(drive, samples, 1))
-        accelerations.append(steady_periods(play(bench, drive).acceleration, samples, 1))
-    return identify_table(
-        np.array(drives), np.array(accelerations), lines, RATE, date=IDENTIFIED, specimen="as mounted"
-    )
+    made = (multisine(lines, amplitudes, samples, RATE, random, prior) for _ in range(realisations))
+    return [each.scaled_to(level, prior) for each in made]
 
 
 def closed_form(f: Array, shaker: Shaker, specimen: Specimen, rate: float) -> NDArray[np.complex128]:

@@ -21,7 +21,7 @@ def test_the_range_is_that_of_the_drawn_specimens() -> None:
     assert branch is not None
     exact = SpecimenKnowledge(stiffness=0.0, damping=0.0, restitution=0.0, spring=0.0)
     certain, drawn = (
-        long_term(branch, known, Shaker(), 5, cycles=400, members=4)
+        long_term(branch, known, Shaker(), 5, cycles=300, members=3)
         for known in (exact, SpecimenKnowledge(stiffness=0.005, damping=0.05, restitution=0.002, spring=0.005))
     )
     peaks = (certain.least, certain.mean, certain.greatest)
@@ -35,7 +35,7 @@ def test_the_range_is_that_of_the_drawn_specimens() -> None:
 
 
 def test_the_command_lists_both_kinds_of_motion(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    flags = ["--omega", "15", "--beta", "0.4", "0.97", "--cycles", "400", "--members", "2", "--json"]
+    flags = ["--omega", "15", "--beta", "0.4", "0.97", "--cycles", "300", "--members", "2", "--json"]
     assert main(["predict", "attractor", *flags, "--plot", str(tmp_path / "attractor.png")]) == 0
     stable, unstable = json.loads(capsys.readouterr().out)["points"]
     assert stable["stable"]

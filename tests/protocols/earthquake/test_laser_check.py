@@ -1,6 +1,7 @@
 """The check of the lasers before the records: its sine, and the uncertainty of alpha_2 with and without it."""
 
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from math import tau
 from pathlib import Path
@@ -18,6 +19,8 @@ from bench.control.target import Reach
 from bench.datafile.reader import open_datafile
 from bench.document.campaign import Campaign
 from bench.document.document import Section
+from bench.engine.steps import Publish
+from bench.events import Warned
 from bench.live_values import RunningGain
 from protocols.common.sine.settling import linear_frame
 from protocols.earthquake.laser_check import ABOVE, INSIDE, NAME, LaserCheck, LasersChecked, advice, laser_check
@@ -30,6 +33,8 @@ from sim.errors import InvalidInput
 from sim.linear import steady_response
 from tests.bench.calibrated import calibration
 from tests.protocols.earthquake.test_campaign import bench as bench
+from tests.protocols.earthquake.test_plan import ONE, played_through
+from tests.protocols.earthquake.test_plan import stored as stored
 
 pytestmark = pytest.mark.usefixtures("no_figures")
 
@@ -123,26 +128,26 @@ def test_a_check_with_too_many_missing_samples_is_refused() -> None:
 
 
 def test_a_check_that_fails_leaves_the_campaign_without_it(
-    bench: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    stored: Callable[..., BenchConfiguration], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def evaluate(*_arguments: object) -> None:
         raise InvalidInput("laser check", "3 cycles", "at least 12 without missing samples are required")
 
     monkeypatch.setattr(LaserCheck, "evaluate", evaluate)
-    point = run(tmp_path / "run", bench, "--laser-check")
-    assert point["status"] == "measured"
-    with open_datafile(tmp_path / "run" / "campaign.h5") as record:
-        warned = [event.text for event in record.events if event.kind == "Warned"]
+    asked = ONE.model_copy(update={"laser_check": True})
+    steps, (point,) = played_through(stored(), asked, lambda *_: None)
+    assert point.status == "measured"
+    warned = [step.event.text for step in steps if isinstance(step, Publish) and isinstance(step.event, Warned)]
     assert any("the lasers are not checked" in text and "3 cycles" in text for text in warned)
 
 
-QUICK = ("--tolerance", "0.05", "--spectrum-tolerance", "0.1", "--decay", "1", "--length-ratio", "0.5", "--draws", "40")
+QUICK = ("--tolerance", "0.05", "--spectrum-tolerance", "0.1", "--decay", "1", "--length-ratio", "0.25")
 """One pass of a record in half its time: the lasers err whatever the motion."""
 
 
 def run(folder: Path, bench: Path, *options: str) -> dict[str, Any]:
     asked = ["synthetic:l-aquila", "--table-band", "1:25", "--beta", "0.25", "--seed", "4", "--config", str(bench)]
-    asked += QUICK
+    asked += [*QUICK, "--draws", "40"]
     assert main(["run", "earthquake", *asked, *options, "--out", str(folder)]) == 0
     (point,) = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["points"]
     return point

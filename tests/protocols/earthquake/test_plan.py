@@ -245,12 +245,13 @@ def test_the_identification_is_planned_beforehand_down_to_any_band() -> None:
         simulated = Simulation(bench=VirtualBenchParameters(shaker=shaker))
         return ONE.model_copy(update={"table_band": f"{low:g}:25"}), BenchConfiguration(simulation=simulated)
 
-    asked, low = reaching(0.2)
+    asked, low = reaching(0.4)
     EarthquakeCampaign(asked, low)
     wanted = identification(asked, low)
     f = grid(wanted, low, low.specimen.bare()).frequency
-    assert f[0] <= 0.1
-    assert np.sum((f >= 0.1) & (f < 0.2)) >= 4
+    assert f[0] <= 0.2
+    assert np.sum((f >= 0.2) & (f < 0.4)) >= 4
+    assert wanted.period > 8.0
     assert identification(ONE, low).period == 8.0
     with pytest.raises(InvalidInput, match=r"from 0\.0667 Hz"):
         EarthquakeCampaign(*reaching(0.05))

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from pydantic import ValidationError
 
 from bench.analysis.free_decay.decay import Combined
@@ -255,12 +256,17 @@ def test_a_frame_let_go_by_hand_says_the_same_and_other_masses_are_told(tmp_path
     assert found.correlation(("k1", "m1"))[0, 1] > 0.3
 
 
-def test_decays_of_different_length_are_drawn_together(tmp_path: Path) -> None:
-    out = tmp_path / "run"
+def test_decays_of_different_length_are_drawn_together(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    drawn: list[Figure] = []
+    monkeypatch.setattr("protocols.free_vibration.experiment.write_figure", lambda _, figure: drawn.append(figure))
     parameters = FreeVibrationParameters(excitation="hand", repeats=2, window=5.0, pull=0.025)
-    result, _ = run(parameters, bench(), out, figures=True)
+    result, events = run(parameters, bench(), tmp_path / "run", figures=True)
     assert result.status == "completed"
-    assert (out / "free_vibration.png").exists()
+    fits = [event.columns["laser_1"].values for event in events if isinstance(event, FitFinished)]
+    assert len({fit.size for fit in fits}) == 2
+    (figure,) = drawn
+    spectrum = figure.axes[2]
+    assert {"laser 1", "laser 2"} <= {line.get_label() for line in spectrum.lines}
 
 
 def test_a_slope_of_the_damping_is_told_with_its_expanded_uncertainty() -> None:

@@ -33,11 +33,9 @@ def free(greatest: float, multiplier: float | None = 1.046) -> HarmonicPoint:
     )
 
 
+@pytest.mark.usefixtures("few_specimens")
 @pytest.mark.parametrize(("greatest", "agrees"), [(0.86, True), (4.0, False)])
-def test_the_peaks_are_compared_with_the_ranges_of_the_specimens(
-    greatest: float, agrees: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(free_prediction, "MEMBERS", 21)
+def test_the_peaks_are_compared_with_the_ranges_of_the_specimens(greatest: float, agrees: bool) -> None:
     found = with_free_prediction(free(greatest), SPECIMEN, AMPLITUDE, CONFIGURATION, 5)
     # the attractor on fixed ground was computed elsewhere: nine cycles, peaks up to 0.862; the table adds little
     assert found.alpha_2_greatest_predicted == pytest.approx(0.862, rel=0.01)
@@ -62,6 +60,7 @@ def test_specimens_whose_block_falls_are_not_counted_in_the_range(
     end = None if left < 2 else 1.0
     predicted = {"least": 0.48, "mean": 0.7, "greatest": 0.86, "repeats": 9, "falls": falls / 39}
     predicted |= {"low": [end and 0.4] * 3, "high": [end and 0.9] * 3}
+    monkeypatch.setattr(free_prediction, "MEMBERS", 39)
     monkeypatch.setattr(free_prediction, "_predicted", lambda *_: predicted)
     found = with_free_prediction(free(4.0), SPECIMEN, AMPLITUDE, CONFIGURATION, 5)
     assert found.free_agrees is agrees

@@ -22,13 +22,19 @@ from protocols.harmonic.campaign import HarmonicCampaign
 from protocols.harmonic.protocol import HarmonicParameters
 from sim.gain import predict_gain
 from sim.specimen import Specimen
+from sim.virtual_bench import VirtualBenchParameters
 from tests.undrawn import undrawn
 
 pytestmark = pytest.mark.usefixtures("shared_results")
 
 OMEGA, BETA = 16.0, 0.4
-CONFIGURATION = BenchConfiguration(acquisition=Acquisition(block_duration=0.2))
-"""Fewer blocks than usual take less time."""
+RATE = 1000.0
+CONFIGURATION = BenchConfiguration(
+    acquisition=Acquisition(block_duration=0.2),
+    simulation=Simulation(bench=VirtualBenchParameters(sample_rate=RATE), seed=3),
+)
+"""Fewer blocks and samples than usual take less time."""
+BLOCKS = f"[acquisition]\nblock_duration = 0.2\n[simulation.bench]\nsample_rate = {RATE}\n"
 
 
 def _run(folder: Path, *flags: str) -> tuple[int, Path]:
@@ -39,7 +45,7 @@ def _run(folder: Path, *flags: str) -> tuple[int, Path]:
 def _in_blocks(folder: Path, seed: int) -> tuple[int, Path]:
     """The run of `CONFIGURATION`, with a seed."""
     file = folder.parent / "blocks.toml"
-    file.write_text(f"[acquisition]\nblock_duration = {CONFIGURATION.acquisition.block_duration}\n", encoding="utf-8")
+    file.write_text(BLOCKS, encoding="utf-8")
     return _run(folder, "--seed", f"{seed}", "--config", str(file))
 
 
@@ -168,9 +174,9 @@ def test_alpha_2_can_be_recomputed_from_the_raw_channels(done: Path) -> None:
         for run in (runs[0], runs[-1]):  # the bare frame's run, and the start that came to be measured
             rows = starts[runs == run]
             piece = drift[rows[0] : rows[-1]]
-            cycle = 2.0 * np.pi / OMEGA * 2000.0
-            last = piece.size - round(5.5 * 2000.0)  # the ramp out takes 4 s
-            window = np.abs(piece[last - round(20 * cycle) : last] - piece[:2000].mean())
+            cycle = 2.0 * np.pi / OMEGA * RATE
+            last = piece.size - round(5.5 * RATE)  # the ramp out takes 4 s
+            window = np.abs(piece[last - round(20 * cycle) : last] - piece[: round(RATE)].mean())
             peaks[run] = np.mean([part.max() for part in np.array_split(window, 20)])
     (point,) = _summary(done)["points"]
     assert peaks[runs[-1]] / peaks[runs[0]] == pytest.approx(point["alpha_2"], rel=0.02)
@@ -197,15 +203,14 @@ def test_the_run_shows_what_was_predicted(done: Path, seen: dict[str, float]) ->
         blocks = entry["instrument/blocks"]
         armed = blocks["row"][:][np.flatnonzero(np.diff(blocks["run"][:])) + 1]
         runs = np.split(volts, armed)
-        seen["drive_slew"] = max(float(np.abs(np.diff(run)).max()) for run in runs) * 2000.0
+        seen["drive_slew"] = max(float(np.abs(np.diff(run)).max()) for run in runs) * RATE
         names = [name.decode() for name in entry["preflight/quantity"][:]]
         assert len(names) == 11
         assert list(entry["preflight/margin"][:]) == sorted(entry["preflight/margin"][:])
         assert entry["planned_drive/omega"].shape[0] > 20
         stored = entry["metadata/plan_hash"][()].decode()
     assert _summary(done)["plan_hash"] == stored
-    configuration = CONFIGURATION.model_copy(update={"simulation": Simulation(seed=3)})
-    campaign = HarmonicCampaign(HarmonicParameters(omega=(OMEGA,), beta=(BETA,)), configuration)
+    campaign = HarmonicCampaign(HarmonicParameters(omega=(OMEGA,), beta=(BETA,)), CONFIGURATION)
     found = compile_run("harmonic", campaign, Path())
     assert found.plan_hash == stored
     demands = {each.bound.quantity: each.demand for each in found.margins}
@@ -233,15 +238,12 @@ def test_another_seed_gives_other_numbers(done: Path, tmp_path: Path) -> None:
     assert other["alpha_2"] == pytest.approx(first["alpha_2"], rel=0.02)
 
 
-QUICK = "[acquisition]\nblock_duration = 0.2\n[simulation.bench]\nsample_rate = 1000.0\n"
-
-
 # `tests/protocols/test_identified_specimen.py` has another that is flagged
 @pytest.mark.soak
 def test_a_specimen_that_is_not_as_assumed_is_flagged(tmp_path: Path) -> None:
     configuration = tmp_path / "differs.toml"
     sure = "[uncertainty]\nstiffness = 0.005\ndamping = 0.02\nrestitution = 0.001\nspring = 0.005\n"
-    configuration.write_text(f"{QUICK}{sure}[simulation.specimen.frame]\nk2 = 60.0\n", encoding="utf-8")
+    configuration.write_text(f"{BLOCKS}{sure}[simulation.specimen.frame]\nk2 = 60.0\n", encoding="utf-8")
     with undrawn():
         _, folder = _run(tmp_path / "run", "--measured-cycles", "8", "--config", str(configuration))
     (point,) = _summary(folder)["points"]

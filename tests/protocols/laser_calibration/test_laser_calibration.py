@@ -17,12 +17,16 @@ from bench.analysis.sensor_accuracy import LINEARITY, SCALES, SensorAccuracy, Se
 from bench.analysis.signals import ACCELERATION, DISPLACEMENT, DRIFT, LASER_1, LASER_2, SIGNALS, U1, SignalMap
 from bench.app.catalogue import load_protocol
 from bench.app.cli.main import main
+from bench.app.session import run_session
 from bench.config.model import BenchConfiguration
 from bench.config.result_files import read_calibration, write_calibration
+from bench.config.sections import Acquisition, Simulation
 from bench.config.template import as_toml
 from bench.config.toml import read_configuration
 from bench.datafile.reader import open_datafile
+from bench.engine.interface import Requests, Unattended
 from bench.engine.steps import AcquireAtRest, Done, OperatorAction, RestSamples
+from bench.events import Acquired, Event
 from drivers.rig import Channel, OperatorTask
 from protocols.common.calibrate import Unmeasurable
 from protocols.laser_calibration.curves import HARMONICS, ErrorCurve, Pass, fit_curve, mean_pass
@@ -31,7 +35,9 @@ from protocols.laser_calibration.reference import fit_reference
 from protocols.laser_calibration.scales import calibration, disagreements, require_agreement
 from sim.channel import STOREYS
 from sim.errors import InvalidInput
-from tests.undrawn import undrawn
+from sim.sensors import Laser
+from sim.virtual_bench import VirtualBenchParameters
+from tests.protocols.progress import ends_at_100_percent
 
 PROTOCOL = load_protocol("laser-calibration")
 RANGE = 0.2
@@ -410,17 +416,25 @@ def test_a_calibration_on_the_simulated_bench_agrees_with_its_lasers_and_serves_
     assert "the laser calibration of 2020-01-01 expired on 2020-12-31" in said
 
 
-def test_an_error_with_short_waves_is_found(tmp_path: Path) -> None:
+def test_an_error_with_short_waves_is_found_and_the_progress_ends_at_100_percent(tmp_path: Path) -> None:
     """Five and a half periods over the range; ten harmonics of each cycle would leave 21 um of it."""
-    out, bench, periods = tmp_path / "out", tmp_path / "bench.toml", 5.5
-    bench.write_text(
-        "[acquisition]\nblock_duration = 0.2\n[simulation.bench]\nsample_rate = 1000.0\n"
-        f"laser_1.linearity_periods = {periods}\nlaser_2.linearity_periods = {periods}\n",
-        encoding="utf-8",
+    out, periods, events = tmp_path / "out", 5.5, list[Event]()
+    laser = Laser(linearity_periods=periods)
+    bench = VirtualBenchParameters(sample_rate=1000.0, laser_1=laser, laser_2=laser)
+    configuration = BenchConfiguration(
+        acquisition=Acquisition(block_duration=0.2), simulation=Simulation(bench=bench, seed=5)
     )
-    command = ["run", "laser-calibration", "--seed", "5", "--cycles", "4", "--passes", "6", "--config", str(bench)]
-    with undrawn():
-        assert main([*command, "--out", str(out)]) == 0
+    result = run_session(
+        replace(PROTOCOL, figures=()),
+        PROTOCOL.prepare(LaserCalibrationParameters(passes=6, cycles=4), configuration, None),
+        out=out,
+        operator=Unattended(),
+        subscribers=[lambda event: None if isinstance(event, Acquired) else events.append(event)],
+        requests=Requests(),
+        realtime=False,
+    )
+    assert result.status == "completed", result.reason
+    ends_at_100_percent(events)
     one = read_calibration(out / "laser_calibration.json")
     for laser, curve in enumerate(one.lasers):
         x = np.linspace(curve.lowest, curve.highest, 401)
