@@ -1,16 +1,12 @@
 """Short ways to the kernel for tests that need more of it than `simulate` offers."""
 
 from math import inf, pi
-from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sim.kernel import rocking as kernel
 from sim.specimen import Specimen
-
-run: Any = cast(Any, kernel.run).py_func
-"""`sim.kernel.rocking.run`, of which only the function that it calls is compiled beforehand."""
 
 A_S = 1.01 * 9.81 / 8.0
 """The paper's harmonic amplitude [m/s2], Eq. (11)."""
@@ -32,7 +28,7 @@ def kernel_run(
     x, report = start.copy(), np.empty(kernel.REPORT)
     times = np.empty(0) if times is None else times
     samples = np.full((times.size, 6), np.nan)
-    run(
+    kernel.run(
         specimen.packed(),
         segments,
         x,

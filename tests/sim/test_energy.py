@@ -9,7 +9,7 @@ from sim.kernel import rocking as kernel
 from sim.kernel.equations import energy
 from sim.specimen import Specimen
 from sim.steady import rocking_orbit
-from tests.sim.runs import A_S, kernel_run, run
+from tests.sim.runs import A_S, kernel_run
 
 
 def power(specimen: Specimen, corner: float, x: NDArray[np.float64], a_g: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -60,7 +60,7 @@ def test_energy_is_conserved_without_damping_or_impacts() -> None:
     x, report = np.array([0.01, 0.0, 0.0, 0.1, 0.1, 0.0]), np.empty(kernel.REPORT)
     before = energy(packed, 1.0, x)
     segments, nothing = still(0.2), np.empty(0)
-    run(packed, segments, x, nothing, np.empty((0, 6)), 20, 1e-13, np.inf, 1.5, 0.0, 0.0, 9, report)
+    kernel.run(packed, segments, x, nothing, np.empty((0, 6)), 20, 1e-13, np.inf, 1.5, 0.0, 0.0, 9, report)
     assert report[kernel.IMPACTS] == 0
     assert energy(packed, 1.0, x) == pytest.approx(before, rel=1e-13)
 

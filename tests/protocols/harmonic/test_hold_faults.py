@@ -154,8 +154,7 @@ def test_a_laser_that_loses_its_target_in_every_block_releases_the_hold(
         pytest.param(
             stuck(LASER_2), "time with a constant count of laser_2", id="laser frozen", marks=pytest.mark.soak
         ),
-        # the matrix of faults has late blocks too
-        pytest.param(once(late(0.6)), "delay of a block of samples", id="block late", marks=pytest.mark.soak),
+        pytest.param(once(late(0.6)), "delay of a block of samples", id="block late"),
     ],
 )
 def test_the_run_is_ended_by_the_guard(story: Callable[[Begin], Story], making: Making, says: str) -> None:
