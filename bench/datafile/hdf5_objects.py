@@ -26,7 +26,7 @@ def is_hard_link(parent: Any, name: str) -> bool:
     """Whether the member `name` is an object stored in the file, not a soft or external link. Raises KeyError if there
     is no such member.
     """
-    return parent.id.links.get_info(_encoded(name)).type == h5py.h5l.TYPE_HARD
+    return parent.id.links.get_info(encoded(name)).type == h5py.h5l.TYPE_HARD
 
 
 def stored_member(parent: Any, name: str, *, read_only: bool = False) -> Any:
@@ -34,7 +34,7 @@ def stored_member(parent: Any, name: str, *, read_only: bool = False) -> Any:
 
     In a `read_only` file, a dataset keeps its shape in memory.
     """
-    found = h5py.h5o.open(parent.id, _encoded(name))
+    found = h5py.h5o.open(parent.id, encoded(name))
     if isinstance(found, h5py.h5g.GroupID):
         return h5py.Group(found)
     return h5py.Dataset(found, readonly=read_only) if isinstance(found, h5py.h5d.DatasetID) else parent[name]
@@ -56,5 +56,11 @@ def attributes(owner: Any) -> dict[str, Any]:
     return found
 
 
-def _encoded(name: str) -> bytes:
+def encoded(name: str) -> bytes:
+    """The name of an object as HDF5 stores it."""
     return name.encode("utf-8", "surrogateescape")
+
+
+def decoded(name: bytes) -> str:
+    """The inverse of `encoded`."""
+    return name.decode("utf-8", "surrogateescape")
