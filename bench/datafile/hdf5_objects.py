@@ -14,12 +14,13 @@ import h5py.h5d
 import h5py.h5g
 import h5py.h5l
 import h5py.h5o
+import h5py.h5s
 import h5py.h5t
 import numpy as np
 
 _TEXT = h5py.string_dtype()
 _TEXT_HELD = h5py.h5t.py_create(_TEXT)
-_NUMBERS = h5py.h5t.TypeIntegerID, h5py.h5t.TypeFloatID
+_NUMBERS = tuple((h5py.h5t.py_create(dtype), dtype) for dtype in map(np.dtype, ("<i1", "<f8", "<i8")))
 
 
 def is_hard_link(parent: Any, name: str) -> bool:
@@ -43,17 +44,31 @@ def stored_member(parent: Any, name: str, *, read_only: bool = False) -> Any:
 def attributes(owner: Any) -> dict[str, Any]:
     """All attributes by name, with the same values as in `owner.attrs`."""
     found: dict[str, Any] = {}
-    for number in range(h5py.h5a.get_num_attrs(owner.id)):
-        stored: Any = h5py.h5a.open(owner.id, index=number)
-        name, kind = stored.name.decode("utf-8", "surrogateescape"), stored.get_type()
-        text = isinstance(kind, h5py.h5t.TypeStringID) and kind.is_variable_str()
-        if stored.shape != () or not (text or isinstance(kind, _NUMBERS)):
-            found[name] = owner.attrs[name]
-            continue
-        value: Any = np.empty((), _TEXT if text else kind.dtype)
-        stored.read(value, mtype=_TEXT_HELD if text else None)
-        found[name] = value[()].decode("utf-8", "surrogateescape") if text else value[()]
+    names: list[bytes] = []
+    h5py.h5a.iterate(owner.id, names.append)
+    for stored in names:
+        name, value = decoded(stored), _scalar(h5py.h5a.open(owner.id, stored))
+        found[name] = owner.attrs[name] if value is None else value
     return found
+
+
+def _scalar(stored: Any) -> Any:
+    """The value of an attribute if it is one text or one number of a usual type; None otherwise."""
+    if stored.get_space().get_simple_extent_type() != h5py.h5s.SCALAR:
+        return None
+    kind = stored.get_type()
+    if isinstance(kind, h5py.h5t.TypeStringID):
+        if not kind.is_variable_str():
+            return None
+        text: Any = np.empty((), _TEXT)
+        stored.read(text, mtype=_TEXT_HELD)
+        return text[()].decode("utf-8", "surrogateescape")
+    for usual, dtype in _NUMBERS:
+        if kind.equal(usual):
+            number = np.empty((), dtype)
+            stored.read(number, mtype=usual)
+            return number[()]
+    return None
 
 
 def encoded(name: str) -> bytes:
