@@ -88,7 +88,7 @@ class Field:
 def decode(stored: hdf5.Dataset) -> list[Any]:
     """The inverse of `encode` for the values of a field; absent values are None."""
     with reading(stored.name):
-        return _decoded(Kind(stored.attrs["kind"]), bool(stored.attrs["optional"]), _read(stored))
+        return _decoded(Kind(stored.attrs["kind"]), bool(stored.attrs["optional"]), hdf5.read(stored, slice(None)))
 
 
 def _decoded(kind: Kind, optional: bool, values: NDArray[Any]) -> list[Any]:
@@ -111,7 +111,7 @@ def field_of(name: str, stored: hdf5.Dataset) -> Field:
 def values_of(field: Field, stored: hdf5.Dataset) -> list[Any]:
     """The values of a field that `field_of` has read from its dataset; absent values are None."""
     with reading(stored.name):
-        return _decoded(field.kind, field.optional, _read(stored))
+        return _decoded(field.kind, field.optional, hdf5.read(stored, slice(None)))
 
 
 def fields_from(declared: Any) -> tuple[Field, ...]:
@@ -178,10 +178,6 @@ def _is_array(hint: Any) -> bool:
     origin = get_origin(hint)
     # NDArray is a generic type in NumPy up to 2.4 and on Python 3.11, and an alias of a generic type later
     return np.ndarray in (origin, get_origin(getattr(origin, "__value__", None)))
-
-
-def _read(stored: hdf5.Dataset) -> NDArray[Any]:
-    return hdf5.read(stored, slice(None))
 
 
 def _classify(item: str, annotation: Any) -> tuple[Kind, bool]:

@@ -22,6 +22,8 @@ from bench.datafile.hdf5_creation import copy_member as copy_member
 from bench.datafile.hdf5_creation import describe as describe
 from bench.datafile.hdf5_creation import memory_file as memory_file
 from bench.datafile.hdf5_creation import text_type as text_type
+from bench.datafile.hdf5_objects import all_values as all_values
+from bench.datafile.hdf5_objects import attribute_value as attribute_value
 from bench.datafile.hdf5_objects import attributes as attributes
 from bench.datafile.hdf5_reading import Dataset as Dataset
 from bench.datafile.hdf5_reading import File as File

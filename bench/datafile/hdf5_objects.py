@@ -52,6 +52,12 @@ def attributes(owner: Any) -> dict[str, Any]:
     return found
 
 
+def attribute_value(owner: Any, name: str) -> Any:
+    """The attribute `name`, with the same value as `owner.attrs[name]`. Raises KeyError if there is none."""
+    value = _scalar(h5py.h5a.open(owner.id, encoded(name)))
+    return owner.attrs[name] if value is None else value
+
+
 def _scalar(stored: Any) -> Any:
     """The value of an attribute if it is one text or one number of a usual type; None otherwise."""
     if stored.get_space().get_simple_extent_type() != h5py.h5s.SCALAR:
@@ -69,6 +75,17 @@ def _scalar(stored: Any) -> Any:
             stored.read(number, mtype=usual)
             return number[()]
     return None
+
+
+def all_values(stored: Any) -> Any:
+    """All values of a dataset, as returned by `stored[()]`."""
+    raw = stored.id
+    dtype, space = raw.dtype, raw.get_space()
+    if dtype.kind not in "iufS" or space.get_simple_extent_type() == h5py.h5s.NULL:
+        return stored[()]
+    values: Any = np.empty(space.get_simple_extent_dims(), dtype)
+    raw.read(space, space, values)
+    return values if values.shape else values[()]
 
 
 def encoded(name: str) -> bytes:

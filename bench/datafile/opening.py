@@ -42,11 +42,9 @@ def check_whole(entry: hdf5.Group, counted: Mapping[str, int], size: int) -> Non
     Raises HDF5's exceptions for damage, and DataFileError for rows beyond `size` bytes.
     """
     for group in hdf5.groups(entry):
-        for name in group.attrs:
-            _ = group.attrs[name]
+        hdf5.attributes(group)
     for stored in hdf5.datasets(entry):
-        for name in stored.attrs:
-            _ = stored.attrs[name]
+        hdf5.attributes(stored)
         if hdf5.grows(stored):
             whole = intact_rows(stored, size) >= min(counted[part_of(stored.name, counted)], stored.shape[0])
         else:
