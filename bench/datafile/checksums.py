@@ -74,7 +74,7 @@ class Checksums:
         for path, known in self._values.items():
             if not known:
                 self._values[path] = grown.get(path) or of_values(hdf5.dataset(self._entry, path))
-        self._stored[...] = np.array([text.encode() for text in self._values.values()], dtype=hdf5.text_type(WIDTH))
+        hdf5.overwrite(self._stored, [text.encode() for text in self._values.values()])
 
 
 def of_values(stored: hdf5.Dataset) -> str:

@@ -5,6 +5,7 @@ import inspect
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import lru_cache
 from types import NoneType, UnionType
 from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
 
@@ -130,6 +131,7 @@ def fields_from(declared: Any) -> tuple[Field, ...]:
     return tuple(fields) if len({each.name for each in fields}) == len(fields) else ()
 
 
+@lru_cache(maxsize=256)
 def fields_of(row_type: type[Any]) -> tuple[Field, ...]:
     """The fields of a group of parameters, or the columns of a dataclass (`sim.parameters.column`) other than its
     parts.
@@ -167,11 +169,12 @@ def parts_of(row_type: type[Any]) -> tuple[str, type[Any]] | None:
     return None
 
 
-def _columns(row_type: type[Any]) -> list[tuple[str, Any, Mapping[str, str]]]:
+@lru_cache(maxsize=256)
+def _columns(row_type: type[Any]) -> tuple[tuple[str, Any, Mapping[str, str]], ...]:
     """Name, type and declaration of each field declared as a column."""
     hints = get_type_hints(row_type)
     declared = dataclasses.fields(row_type)
-    return [(each.name, hints[each.name], each.metadata) for each in declared if "unit" in each.metadata]
+    return tuple((each.name, hints[each.name], each.metadata) for each in declared if "unit" in each.metadata)
 
 
 def _is_array(hint: Any) -> bool:

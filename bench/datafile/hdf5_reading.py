@@ -215,9 +215,11 @@ def places_of_chunks(stored: Dataset) -> dict[int, tuple[int, int]]:
 def read(stored: Dataset, key: object = ()) -> Any:
     """Values of a dataset, or the value of a scalar. Raises DataFileError if they cannot be read."""
     with reading(stored.name):
-        if key == () or (key == slice(None) and stored.shape):
-            return all_values(stored)
-        return stored[key]
+        if key not in ((), slice(None)):
+            return stored[key]
+        values = all_values(stored)
+        # a scalar has no rows
+        return values if key == () or np.ndim(values) else stored[key]
 
 
 def attribute(owner: Group | Dataset, name: str) -> Any:
