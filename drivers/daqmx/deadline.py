@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import grpc
@@ -78,9 +79,22 @@ class Remembered:
         return self._answers[key]
 
 
+class OnDemand:
+    """A procedure of the server whose call object is created by `make` at the first call."""
+
+    def __init__(self, make: Callable[[], Any]) -> None:
+        self._make = make
+        self._call: Any = None
+
+    def __call__(self, request: Any, **options: Any) -> Any:
+        if self._call is None:
+            self._call = self._make()
+        return self._call(request, **options)
+
+
 class ReusedCalls:
-    """A channel that creates the call object of each procedure of the server only once; nidaqmx requests the objects of
-    all procedures, about 450, for every task.
+    """A channel that creates the call object of each procedure of the server only once, when it is first used; nidaqmx
+    requests the objects of all procedures, about 450, for every task.
     """
 
     def __init__(self, channel: Any) -> None:
@@ -90,7 +104,7 @@ class ReusedCalls:
     def unary_unary(self, method: str, *arguments: Any, **options: Any) -> Any:
         """The object that calls `method`; arguments and options are those of gRPC."""
         if method not in self._calls:
-            call = self._channel.unary_unary(method, *arguments, **options)
+            call = OnDemand(partial(self._channel.unary_unary, method, *arguments, **options))
             self._calls[method] = Remembered(call) if method.endswith(f"/{_CONSTANT}") else call
         return self._calls[method]
 
