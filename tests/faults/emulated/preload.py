@@ -6,7 +6,9 @@ import os
 # it tells on standard error of every server that goes, as many do here
 os.environ.setdefault("GRPC_VERBOSITY", "ERROR")
 
-import tests.faults.emulated.judge  # noqa: F401
+import nidaqmx._grpc_interpreter  # noqa: F401  # pyright: ignore[reportUnusedImport]
+
+import tests.faults.emulated.pool  # noqa: F401  # pyright: ignore[reportUnusedImport]
 from drivers.emulation.optoncdt import laser
 from sim.virtual_bench import VirtualBench
 from tests.faults.setup import BARE, PARAMETERS
