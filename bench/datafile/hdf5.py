@@ -41,6 +41,7 @@ from bench.datafile.hdf5_reading import is_dataset as is_dataset
 from bench.datafile.hdf5_reading import member_or_target as member_or_target
 from bench.datafile.hdf5_reading import members as members
 from bench.datafile.hdf5_reading import names as names
+from bench.datafile.hdf5_reading import objects as objects
 from bench.datafile.hdf5_reading import place as place
 from bench.datafile.hdf5_reading import places_of_chunks as places_of_chunks
 from bench.datafile.hdf5_reading import read as read

@@ -160,11 +160,19 @@ def datasets(parent: Group, lost: dict[str, str] | None = None) -> Iterator[Data
 
 def groups(parent: Group) -> Iterator[Group]:
     """A group and every group below it, in the order of creation."""
+    return (cast(Group, each) for each in objects(parent) if not is_dataset(each))
+
+
+def objects(parent: Group) -> Iterator["Group | Dataset"]:
+    """A group and every group and dataset below it, in the order of creation, excluding views."""
     yield parent
     for name, member in members(parent):
         if isinstance(member, h5py.Group):
-            yield from groups(cast(Group, member))
-        elif not isinstance(member, str | h5py.Dataset):
+            yield from objects(cast(Group, member))
+        elif isinstance(member, h5py.Dataset):
+            if not cast(bool, member.is_virtual):
+                yield cast(Dataset, member)
+        elif not isinstance(member, str):
             # raises the error that names it
             group(parent, name)
 
