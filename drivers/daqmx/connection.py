@@ -178,4 +178,4 @@ class Connection:
             self._channel.close()
             raise
         self._deadline = Deadline(patience)
-        self._calls = ReusedCalls(library.intercept_channel(self._channel, self._deadline))
+        self._calls = ReusedCalls(self._channel, self._deadline)
