@@ -67,8 +67,7 @@ class ClockWatch:
 
 def _described(daq: "Daq") -> str:
     """The connection to `daq.server` as one line of JSON."""
-    given = daq.model_dump(include={"server", "timeout_margin", "tls", "plain_connection"})
-    return json.dumps(given, ensure_ascii=True)
+    return json.dumps(daq.model_dump(include={"server", "timeout_margin", "tls", "plain_connection"}))
 
 
 def _serve(name: str, rate: float, daq: Any, readings: IO[bytes]) -> None:
