@@ -6,7 +6,8 @@ groups cover their attributes and link targets, such as the plotted data and the
 """
 
 import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
+from collections import defaultdict
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from functools import lru_cache
 from hashlib import sha256
@@ -73,16 +74,17 @@ class Checksums:
         for path, known in self._values.items():
             if not known:
                 self._values[path] = grown.get(path) or of_values(hdf5.dataset(self._entry, path))
-        self._stored[...] = np.array([text.encode() for text in self._values.values()], dtype=hdf5.text_type(WIDTH))
+        hdf5.overwrite(self._stored, [text.encode() for text in self._values.values()])
 
 
 def of_values(stored: hdf5.Dataset) -> str:
     """SHA-256 of the values of a dataset, read piece by piece."""
     digest = sha256()
-    if not stored.shape:
-        digest.update(_bytes(np.asarray(stored[()], dtype=stored.dtype)))
+    shape = stored.shape
+    if not shape or shape[0] <= ROWS_AT_ONCE:
+        digest.update(_bytes(np.asarray(hdf5.all_values(stored), dtype=stored.dtype)))
     else:
-        for start in range(0, stored.shape[0], ROWS_AT_ONCE):
+        for start in range(0, shape[0], ROWS_AT_ONCE):
             digest.update(_bytes(stored[start : start + ROWS_AT_ONCE]))
     return digest.hexdigest()
 
@@ -92,9 +94,11 @@ def of_attributes(stored: hdf5.Dataset) -> str:
     return _of_json(_plain_values(hdf5.attributes(stored)))
 
 
-def of_group(group: hdf5.Group) -> str:
-    """SHA-256 of a group's attributes and link targets, both by name, as JSON."""
-    links = {name: target for name, target in hdf5.members(group) if isinstance(target, str)}
+def of_group(group: hdf5.Group, datasets: Container[str] = ()) -> str:
+    """SHA-256 of a group's attributes and link targets, both by name, as JSON. `datasets` are the names of members that
+    are known to be datasets, which are not opened again.
+    """
+    links = {name: target for name, target in hdf5.members(group, without=datasets) if isinstance(target, str)}
     return _of_contents(hdf5.attributes(group), links)
 
 
@@ -228,10 +232,13 @@ def integrity(entry: hdf5.Group, largest: int | None = SMALL, done: Done = lambd
         return Integrity(0, {f"/entry/{GROUP}": f"the checksums cannot be read ({reason(error)})"})
     failing: dict[str, str] = {}
     unchecked: list[str] = []
+    opened = defaultdict[str, set[str]](set)
     for number, (path, (values, attributes)) in enumerate(known.items()):
         done(number, len(known))
         try:
             stored = hdf5.dataset(entry, path)
+            folder, _, name = path.rpartition("/")
+            opened[folder].add(name)
             looked = bool(values) and (largest is None or stored.nbytes <= largest)
             if changes := _compared(stored, values if looked else "", attributes):
                 failing[path] = changes
@@ -241,7 +248,7 @@ def integrity(entry: hdf5.Group, largest: int | None = SMALL, done: Done = lambd
             failing[path] = _lost(entry, path, error)
     for path, attributes in groups.items():
         try:
-            if of_group(hdf5.group(entry, path)) != attributes:
+            if of_group(hdf5.group(entry, path), opened[path]) != attributes:
                 failing[path] = f"the attributes or links of {path} were changed"
         except UNREADABLE as error:
             failing[path] = _lost(entry, path, error)

@@ -5,6 +5,7 @@ import inspect
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import lru_cache
 from types import NoneType, UnionType
 from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
 
@@ -88,7 +89,7 @@ class Field:
 def decode(stored: hdf5.Dataset) -> list[Any]:
     """The inverse of `encode` for the values of a field; absent values are None."""
     with reading(stored.name):
-        return _decoded(Kind(stored.attrs["kind"]), bool(stored.attrs["optional"]), _read(stored))
+        return _decoded(Kind(stored.attrs["kind"]), bool(stored.attrs["optional"]), hdf5.read(stored, slice(None)))
 
 
 def _decoded(kind: Kind, optional: bool, values: NDArray[Any]) -> list[Any]:
@@ -111,7 +112,7 @@ def field_of(name: str, stored: hdf5.Dataset) -> Field:
 def values_of(field: Field, stored: hdf5.Dataset) -> list[Any]:
     """The values of a field that `field_of` has read from its dataset; absent values are None."""
     with reading(stored.name):
-        return _decoded(field.kind, field.optional, _read(stored))
+        return _decoded(field.kind, field.optional, hdf5.read(stored, slice(None)))
 
 
 def fields_from(declared: Any) -> tuple[Field, ...]:
@@ -130,6 +131,7 @@ def fields_from(declared: Any) -> tuple[Field, ...]:
     return tuple(fields) if len({each.name for each in fields}) == len(fields) else ()
 
 
+@lru_cache(maxsize=256)
 def fields_of(row_type: type[Any]) -> tuple[Field, ...]:
     """The fields of a group of parameters, or the columns of a dataclass (`sim.parameters.column`) other than its
     parts.
@@ -167,21 +169,18 @@ def parts_of(row_type: type[Any]) -> tuple[str, type[Any]] | None:
     return None
 
 
-def _columns(row_type: type[Any]) -> list[tuple[str, Any, Mapping[str, str]]]:
+@lru_cache(maxsize=256)
+def _columns(row_type: type[Any]) -> tuple[tuple[str, Any, Mapping[str, str]], ...]:
     """Name, type and declaration of each field declared as a column."""
     hints = get_type_hints(row_type)
     declared = dataclasses.fields(row_type)
-    return [(each.name, hints[each.name], each.metadata) for each in declared if "unit" in each.metadata]
+    return tuple((each.name, hints[each.name], each.metadata) for each in declared if "unit" in each.metadata)
 
 
 def _is_array(hint: Any) -> bool:
     origin = get_origin(hint)
     # NDArray is a generic type in NumPy up to 2.4 and on Python 3.11, and an alias of a generic type later
     return np.ndarray in (origin, get_origin(getattr(origin, "__value__", None)))
-
-
-def _read(stored: hdf5.Dataset) -> NDArray[Any]:
-    return hdf5.read(stored, slice(None))
 
 
 def _classify(item: str, annotation: Any) -> tuple[Kind, bool]:

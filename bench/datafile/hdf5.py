@@ -18,10 +18,14 @@ from numpy.typing import DTypeLike, NDArray
 from bench.datafile.access import VERSIONS, Quiet, is_let_go, locking, open_living
 from bench.datafile.access import open_to_write as open_to_write
 from bench.datafile.hdf5_creation import GZIP_LEVEL, create_fixed, create_growing
+from bench.datafile.hdf5_creation import append as append
 from bench.datafile.hdf5_creation import copy_member as copy_member
 from bench.datafile.hdf5_creation import describe as describe
 from bench.datafile.hdf5_creation import memory_file as memory_file
+from bench.datafile.hdf5_creation import overwrite as overwrite
 from bench.datafile.hdf5_creation import text_type as text_type
+from bench.datafile.hdf5_objects import all_values as all_values
+from bench.datafile.hdf5_objects import attribute_value as attribute_value
 from bench.datafile.hdf5_objects import attributes as attributes
 from bench.datafile.hdf5_reading import Dataset as Dataset
 from bench.datafile.hdf5_reading import File as File
@@ -37,6 +41,7 @@ from bench.datafile.hdf5_reading import is_dataset as is_dataset
 from bench.datafile.hdf5_reading import member_or_target as member_or_target
 from bench.datafile.hdf5_reading import members as members
 from bench.datafile.hdf5_reading import names as names
+from bench.datafile.hdf5_reading import objects as objects
 from bench.datafile.hdf5_reading import place as place
 from bench.datafile.hdf5_reading import places_of_chunks as places_of_chunks
 from bench.datafile.hdf5_reading import read as read
@@ -214,14 +219,7 @@ def clip_text(text: str, width: int) -> bytes:
 
 def replace_text(target: Dataset, text: str, width: int) -> None:
     """Replace the string in a scalar of `width` bytes; a longer `text` is truncated."""
-    target[()] = np.array(clip_text(text, width), dtype=text_type(width))
-
-
-def append(target: Dataset, values: NDArray[Any]) -> None:
-    """Append `values` as rows."""
-    start = target.shape[0]
-    target.resize((start + len(values),))
-    target[start:] = values
+    overwrite(target, np.array(clip_text(text, width), dtype=text_type(width)))
 
 
 def append_chunks(target: Dataset, packed: Iterable[bytes], count: int, rows: int) -> None:

@@ -1,9 +1,10 @@
 # pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
 # pyright: reportUnknownArgumentType=false
-"""Creation of datasets and attributes through h5py's low-level interface, with the same result as h5py's own functions
-in half the processor time.
+"""Creation and writing of datasets and attributes through h5py's low-level interface, with the same result as h5py's
+own functions in half the processor time or less.
 
-A file has about 200 datasets and 600 attributes, all of which are created before the run starts.
+A file has about 200 datasets and 600 attributes, all of which are created before the run starts. The rows of an event
+are written almost at once, so that most writes are small.
 """
 
 from functools import lru_cache
@@ -29,6 +30,7 @@ _GROWING = h5py.h5s.create_simple((0,), (h5py.h5s.UNLIMITED,))
 GZIP_LEVEL = 1
 
 
+@lru_cache(maxsize=64)
 def text_type(width: int) -> np.dtype[Any]:
     """Type for UTF-8 strings of `width` bytes, in memory and in the file, because HDF5 does not convert plain bytes."""
     return h5py.string_dtype("utf-8", width)
@@ -61,6 +63,30 @@ def create_growing(parent: Any, name: str, dtype: np.dtype[Any], chunk: int, *, 
     """Create an empty dataset in chunks of `chunk` rows."""
     layout = _layout(chunk, compress)
     return h5py.Dataset(h5py.h5d.create(parent.id, name.encode(), _stored(dtype), _GROWING, dcpl=layout))
+
+
+def append(target: Any, values: NDArray[Any]) -> None:
+    """Append `values`, shape (n,), as rows."""
+    raw, kept = target.id, np.ascontiguousarray(values, dtype=target.dtype)
+    (start,) = raw.shape
+    raw.set_extent((start + len(kept),))
+    rows = raw.get_space()
+    rows.select_hyperslab((start,), kept.shape)
+    raw.write(h5py.h5s.create_simple(kept.shape), rows, kept, mtype=_held(raw, kept))
+
+
+def overwrite(target: Any, values: Any) -> None:
+    """Replace all values of a dataset by as many others."""
+    raw, kept = target.id, np.asarray(values, dtype=target.dtype, order="C")
+    space = raw.get_space()
+    raw.write(space, space, kept.reshape(space.get_simple_extent_dims()), mtype=_held(raw, kept))
+
+
+def _held(raw: Any, values: NDArray[Any]) -> Any:
+    """HDF5 type of `values` in memory, which have the NumPy type of the dataset: the stored type, except for Python
+    objects, for which h5py determines it.
+    """
+    return raw.get_type() if values.dtype.kind in "iufS" else None
 
 
 def copy_member(source: Any, name: str, parent: Any, new_name: str) -> None:

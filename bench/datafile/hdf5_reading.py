@@ -2,7 +2,7 @@
 """Access to a file's objects through h5py. Damage raises a DataFileError that names the object."""
 
 import re
-from collections.abc import Generator, Iterator
+from collections.abc import Container, Generator, Iterator
 from contextlib import contextmanager, suppress
 from typing import Any, Protocol, Self, TypeGuard, cast
 
@@ -10,7 +10,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.datafile.hdf5_objects import is_hard_link, stored_member
+from bench.datafile.hdf5_objects import all_values, attribute_value, is_hard_link, stored_member
 from sim.errors import RockbenchError
 
 
@@ -115,13 +115,16 @@ def group(parent: Group, path: str) -> Group:
     return cast(Group, _member(parent, path, h5py.Group))
 
 
-def members(parent: Group, lost: dict[str, str] | None = None) -> Iterator[tuple[str, "Dataset | Group | str"]]:
-    """Members of a group, by name: datasets, groups, and target paths of soft links.
+def members(
+    parent: Group, lost: dict[str, str] | None = None, without: Container[str] = ()
+) -> Iterator[tuple[str, "Dataset | Group | str"]]:
+    """Members of a group, by name: datasets, groups, and target paths of soft links. Those with names in `without` are
+    not opened.
 
     The reason for each unreadable member is added to `lost` by path; without `lost`, DataFileError is raised.
     """
     try:
-        names, read_only = list(parent), _is_read_only(parent)
+        names, read_only = [name for name in parent if name not in without], _is_read_only(parent)
     except UNREADABLE as error:
         names, read_only = _record_loss(parent.name, error, lost), False
     for name in names:
@@ -157,11 +160,19 @@ def datasets(parent: Group, lost: dict[str, str] | None = None) -> Iterator[Data
 
 def groups(parent: Group) -> Iterator[Group]:
     """A group and every group below it, in the order of creation."""
+    return (cast(Group, each) for each in objects(parent) if not is_dataset(each))
+
+
+def objects(parent: Group) -> Iterator["Group | Dataset"]:
+    """A group and every group and dataset below it, in the order of creation, excluding views."""
     yield parent
     for name, member in members(parent):
         if isinstance(member, h5py.Group):
-            yield from groups(cast(Group, member))
-        elif not isinstance(member, str | h5py.Dataset):
+            yield from objects(cast(Group, member))
+        elif isinstance(member, h5py.Dataset):
+            if not cast(bool, member.is_virtual):
+                yield cast(Dataset, member)
+        elif not isinstance(member, str):
             # raises the error that names it
             group(parent, name)
 
@@ -212,20 +223,24 @@ def places_of_chunks(stored: Dataset) -> dict[int, tuple[int, int]]:
 def read(stored: Dataset, key: object = ()) -> Any:
     """Values of a dataset, or the value of a scalar. Raises DataFileError if they cannot be read."""
     with reading(stored.name):
-        return stored[key]
+        if key not in ((), slice(None)):
+            return stored[key]
+        values = all_values(stored)
+        # a scalar has no rows
+        return values if key == () or np.ndim(values) else stored[key]
 
 
 def attribute(owner: Group | Dataset, name: str) -> Any:
     """The attribute `name` of `owner`. Raises DataFileError if there is no such attribute or it cannot be read."""
     with reading(f"the attribute {name} of {owner.name}"):
-        return owner.attrs[name]
+        return attribute_value(owner, name)
 
 
 def read_text(parent: Group, path: str) -> str:
     """Read a scalar string."""
     stored = dataset(parent, path)
     with reading(stored.name):
-        return bytes(stored[()]).decode()
+        return bytes(all_values(stored)).decode()
 
 
 def read_texts(stored: NDArray[Any]) -> list[str]:

@@ -22,7 +22,7 @@ from sim.errors import CauseCode, InvalidInput
 def intact_rows(stored: hdf5.Dataset, size: int) -> int:
     """Number of rows before the first chunk that is lost or that extends beyond the first `size` bytes of the file."""
     length, chunk = stored.shape[0], (stored.chunks or (1,))[0]
-    places = hdf5.places_of_chunks(stored)
+    places = hdf5.places_of_chunks(stored) if length else {}
     for start in range(0, length, chunk):
         place = places.get(start)
         if place is None or place[0] + place[1] > size:
@@ -41,12 +41,10 @@ def check_whole(entry: hdf5.Group, counted: Mapping[str, int], size: int) -> Non
 
     Raises HDF5's exceptions for damage, and DataFileError for rows beyond `size` bytes.
     """
-    for group in hdf5.groups(entry):
-        for name in group.attrs:
-            _ = group.attrs[name]
-    for stored in hdf5.datasets(entry):
-        for name in stored.attrs:
-            _ = stored.attrs[name]
+    for stored in hdf5.objects(entry):
+        hdf5.attributes(stored)
+        if not hdf5.is_dataset(stored):
+            continue
         if hdf5.grows(stored):
             whole = intact_rows(stored, size) >= min(counted[part_of(stored.name, counted)], stored.shape[0])
         else:

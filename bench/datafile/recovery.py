@@ -121,7 +121,7 @@ def write_ends(record: DataFile, path: Path, entry: hdf5.Group, lengths: Mapping
     `loss` describes the missing data.
     """
     complete, status, summary, end_time = create_ends(entry, tuple(record.counted))
-    complete[...] = [lengths.get(name, 0) for name in record.counted]
+    hdf5.overwrite(complete, [lengths.get(name, 0) for name in record.counted])
     was, why, end = (_text(record, name) for name in ("status", "summary", "end_time"))
     if was not in [each.value for each in Status] or was == Status.RUNNING:
         # the last modification, as the end of the crashed writer's activity

@@ -6,6 +6,7 @@ unless they must be written immediately.
 
 import json
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -164,20 +165,22 @@ def read_channel(instrument: hdf5.Group, name: str) -> Channel:
     """The channel `name`, with its conversion and valid range. Raises DataFileError if they are damaged."""
     stored = hdf5.dataset(instrument, f"{name}/counts")
     with reading(f"the conversion of {stored.name}"):
-        attrs = stored.attrs
-        low, high = (int(end) for end in attrs["valid"])
+        value, named = partial(hdf5.attribute_value, stored), stored.attrs
+        low, high = (int(end) for end in value("valid"))
         return Channel(
             name=name,
-            quantity=str(attrs["quantity"]),
-            unit=str(attrs["value_units"]),
-            scale=float(attrs["scale"]),
-            offset=float(attrs["offset"]),
+            quantity=str(value("quantity")),
+            unit=str(value("value_units")),
+            scale=float(value("scale")),
+            offset=float(value("offset")),
             valid=(low, high),
-            device=str(attrs["device"]),
-            higher=tuple(float(term) for term in attrs.get("higher", ())),
-            faults={int(count): text for count, text in json.loads(attrs.get("faults", "{}")).items()},
-            delay=float(attrs.get("delay", 0.0)),
-            delay_uncertainty=float(attrs.get("delay_uncertainty", 0.0)),
+            device=str(value("device")),
+            higher=tuple(float(term) for term in (value("higher") if "higher" in named else ())),
+            faults={
+                int(count): text for count, text in json.loads(value("faults") if "faults" in named else "{}").items()
+            },
+            delay=float(value("delay") if "delay" in named else 0.0),
+            delay_uncertainty=float(value("delay_uncertainty") if "delay_uncertainty" in named else 0.0),
         )
 
 

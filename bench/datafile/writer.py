@@ -238,7 +238,7 @@ class DataFileWriter:
         # rows is therefore written afterwards, in place
         self._journal.sync()
         self._flush()
-        self._parts.complete[...] = complete
+        hdf5.overwrite(self._parts.complete, complete)
         self._flush()
         self._complete = complete
 

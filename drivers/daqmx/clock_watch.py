@@ -5,19 +5,23 @@ transmission times to and from the server differ, every time derived from a read
 both in the check of the bench and in a run.
 """
 
+import json
 import struct
 import sys
 import threading
 import time
 from collections import deque
 from contextlib import suppress
-from typing import IO
+from types import SimpleNamespace
+from typing import IO, TYPE_CHECKING, Any
 
 from drivers.child import ENDING, ChildProcess, ignore_requests
 from drivers.clock import now
-from drivers.daqmx.parameters import Daq
 from drivers.timebase.marking import GOLDEN
 from sim import waiting
+
+if TYPE_CHECKING:
+    from drivers.daqmx.parameters import Daq
 
 _READING = struct.Struct("<dqd")
 _PACE = 0.01
@@ -32,13 +36,13 @@ Reading = tuple[float, int, float]
 class ClockWatch:
     """Child process that reads the sample clock, of rate `rate` [1/s], of the task `name` on `daq.server`."""
 
-    def __init__(self, daq: Daq, name: str, rate: float) -> None:
+    def __init__(self, daq: "Daq", name: str, rate: float) -> None:
         self._child = ChildProcess("drivers.daqmx.clock_watch", name, repr(rate))
         self._found: deque[Reading] = deque(maxlen=_MOST)
         self._thread = threading.Thread(target=self._collect, name="clock watch", daemon=True)
         self._thread.start()
         with suppress(OSError):
-            self._child.write(daq.model_dump_json().encode() + b"\n")
+            self._child.write(_described(daq).encode() + b"\n")
 
     @property
     def alive(self) -> bool:
@@ -61,7 +65,12 @@ class ClockWatch:
             self._found.append(_READING.unpack(read))
 
 
-def _serve(name: str, rate: float, daq: Daq, readings: IO[bytes]) -> None:
+def _described(daq: "Daq") -> str:
+    """The connection to `daq.server` as one line of JSON."""
+    return json.dumps(daq.model_dump(include={"server", "timeout_margin", "tls", "plain_connection"}))
+
+
+def _serve(name: str, rate: float, daq: Any, readings: IO[bytes]) -> None:
     """Write readings until the connection to the server is lost."""
     from nidaqmx.errors import DaqError
 
@@ -102,7 +111,8 @@ if __name__ == "__main__":
         # a normal exit would let nidaqmx clear the program's tasks
         os._exit(0)
 
-    given = Daq.model_validate_json(sys.stdin.buffer.readline())
+    # the models of the parameters are slow to import
+    given = json.loads(sys.stdin.buffer.readline(), object_hook=lambda one: SimpleNamespace(**one))
     threading.Thread(target=await_end, daemon=True).start()
     try:
         _serve(sys.argv[1], float(sys.argv[2]), given, sys.stdout.buffer)

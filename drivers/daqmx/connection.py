@@ -8,15 +8,18 @@ import socket
 import threading
 from ipaddress import ip_address
 from pathlib import Path
-from typing import Any, Self, cast
+from typing import TYPE_CHECKING, Any, Self, cast
 
 from nidaqmx.grpc_session_options import GrpcSessionOptions, SessionInitializationBehavior
 
 from drivers.daqmx.library import Options
-from drivers.daqmx.parameters import Daq, Tls
 from drivers.errors import DeviceNotFound
 from sim import waiting
 from sim.errors import InvalidInput
+
+if TYPE_CHECKING:
+    # a process of its own that connects to the server needs no models, which are slow to import
+    from drivers.daqmx.parameters import Daq, Tls
 
 _REMEDY = (
     "it is neither this computer nor in a private network, and others could intercept a plain connection and drive the"
@@ -39,7 +42,7 @@ def require_private(server: str) -> None:
             raise InvalidInput("hardware.daq.server", server, _REMEDY)
 
 
-def credentials(tls: Tls) -> Any:
+def credentials(tls: "Tls") -> Any:
     """Credentials of a gRPC channel. Raises InvalidInput for a file that cannot be read or is not a PEM file, and for a
     certificate without key or a key without certificate.
     """
@@ -86,7 +89,7 @@ class Connection:
     network, or for certificates that cannot be read.
     """
 
-    def __init__(self, server: str | None, patience: float, tls: Tls | None = None, *, plain: bool = False) -> None:
+    def __init__(self, server: str | None, patience: float, tls: "Tls | None" = None, *, plain: bool = False) -> None:
         self.server = server
         self._deadline: Any = None
         self._channel: Any = None
@@ -95,7 +98,7 @@ class Connection:
             self._connect(server, patience, tls, plain=plain)
 
     @classmethod
-    def of(cls, daq: Daq) -> Self:
+    def of(cls, daq: "Daq") -> Self:
         """The connection that the parameters describe."""
         return cls(daq.server, daq.timeout_margin, daq.tls, plain=daq.plain_connection)
 
@@ -122,7 +125,7 @@ class Connection:
             return None
         return GrpcSessionOptions(self._calls, name, initialization_behavior=behavior)
 
-    def _connect(self, server: str, patience: float, tls: Tls | None, *, plain: bool) -> None:
+    def _connect(self, server: str, patience: float, tls: "Tls | None", *, plain: bool) -> None:
         if not server.rpartition(":")[2].isdigit():
             raise InvalidInput("hardware.daq.server", server, f"it must be host:port, such as crio.local:{_PORT}")
         if tls is None and not plain:
@@ -175,4 +178,4 @@ class Connection:
             self._channel.close()
             raise
         self._deadline = Deadline(patience)
-        self._calls = ReusedCalls(library.intercept_channel(self._channel, self._deadline))
+        self._calls = ReusedCalls(self._channel, self._deadline)

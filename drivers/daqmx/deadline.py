@@ -1,8 +1,8 @@
 """Calls to a gRPC device server: their deadlines, and call objects and constant answers shared by all tasks."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any
+from functools import partial
+from typing import Any, cast
 
 import grpc
 
@@ -14,20 +14,8 @@ _LEAST = 0.1
 """Shortest time allowed beyond a call's own time-out [s]."""
 
 
-@dataclass(frozen=True)
-class CallDetails(grpc.ClientCallDetails):
-    """Details of a call: the fields that gRPC requires."""
-
-    method: str
-    timeout: float | None
-    metadata: Any
-    credentials: Any
-    wait_for_ready: bool | None
-    compression: Any
-
-
-class Deadline(grpc.UnaryUnaryClientInterceptor):
-    """Sets the deadline of every call to the call's own time-out plus `patience` [s]; after a first time-out, only a
+class Deadline:
+    """The time allowed for every call: the call's own time-out plus `patience` [s]; after a first time-out, only a
     tenth of `patience` is allowed.
     """
 
@@ -36,26 +24,33 @@ class Deadline(grpc.UnaryUnaryClientInterceptor):
         self.late = False
         """Whether a call has timed out: its effect is unknown."""
 
-    def intercept_unary_unary(
-        self, continuation: Callable[[grpc.ClientCallDetails, Any], Any], client_call_details: Any, request: Any
-    ) -> Any:
-        given = client_call_details
-        details = CallDetails(
-            given.method,
-            self._seconds(str(given.method).rpartition("/")[2], float(getattr(request, "timeout", 0.0))),
-            given.metadata,
-            given.credentials,
-            given.wait_for_ready,
-            given.compression,
-        )
-        call = continuation(details, request)
-        if call.code() is grpc.StatusCode.DEADLINE_EXCEEDED:
-            self.late = True
-        return call
-
-    def _seconds(self, method: str, own: float) -> float:
+    def seconds(self, procedure: str, own: float) -> float:
+        """Time allowed for a call of `procedure` with its `own` time-out [s]."""
         patience = self._patience * (_LATE if self.late else 1.0)
-        return max(own, 0.0) + _SLOW.get(method, 0.0) + max(patience, _LEAST)
+        return max(own, 0.0) + _SLOW.get(procedure, 0.0) + max(patience, _LEAST)
+
+
+class Procedure:
+    """A procedure of the server, called within the time that `deadline` allows. `make` creates its call object, at the
+    first call.
+
+    An interceptor of gRPC would do the same, but it creates the call object anew for every call.
+    """
+
+    def __init__(self, name: str, make: Callable[[], Any], deadline: Deadline) -> None:
+        self._name, self._make, self._deadline = name, make, deadline
+        self._call: Any = None
+
+    def __call__(self, request: Any, **options: Any) -> Any:
+        if self._call is None:
+            self._call = self._make()
+        options["timeout"] = self._deadline.seconds(self._name, float(getattr(request, "timeout", 0.0)))
+        try:
+            return self._call(request, **options)
+        except grpc.RpcError as error:
+            if cast(Any, error).code() is grpc.StatusCode.DEADLINE_EXCEEDED:
+                self._deadline.late = True
+            raise
 
 
 _CONSTANT = "GetSystemInfoAttributeUInt32"
@@ -79,18 +74,19 @@ class Remembered:
 
 
 class ReusedCalls:
-    """A channel that creates the call object of each procedure of the server only once; nidaqmx requests the objects of
-    all procedures, about 450, for every task.
+    """A channel that creates the call object of each procedure of the server only once, when it is first used; nidaqmx
+    requests the objects of all procedures, about 450, for every task.
     """
 
-    def __init__(self, channel: Any) -> None:
-        self._channel = channel
+    def __init__(self, channel: Any, deadline: Deadline) -> None:
+        self._channel, self._deadline = channel, deadline
         self._calls: dict[str, Any] = {}
 
     def unary_unary(self, method: str, *arguments: Any, **options: Any) -> Any:
         """The object that calls `method`; arguments and options are those of gRPC."""
         if method not in self._calls:
-            call = self._channel.unary_unary(method, *arguments, **options)
+            make = partial(self._channel.unary_unary, method, *arguments, **options)
+            call = Procedure(method.rpartition("/")[2], make, self._deadline)
             self._calls[method] = Remembered(call) if method.endswith(f"/{_CONSTANT}") else call
         return self._calls[method]
 
