@@ -23,7 +23,7 @@ CUBIC = 1e-15
 """Bound of a cubic term, relative to the value, below which a polynomial is a parabola up to its extremum."""
 
 
-@compiled("Tuple((float64, float64, float64))(float64[::1], int64, float64)")
+@compiled("Tuple((float64, float64, float64))(float64[::1], int64, float64)", internal=True)
 def evaluate(p: NDArray[np.float64], n: int, t: float) -> tuple[float, float, float]:
     """Value, first derivative and half the second derivative of sum p_k t^k, k = 0..n (Horner)."""
     value = slope = half_bend = 0.0
@@ -34,7 +34,7 @@ def evaluate(p: NDArray[np.float64], n: int, t: float) -> tuple[float, float, fl
     return value, slope, half_bend
 
 
-@compiled("float64(float64[::1], int64, float64)")
+@compiled("float64(float64[::1], int64, float64)", internal=True)
 def first_root(p: NDArray[np.float64], n: int, h: float) -> float:
     """Smallest t in [0, h] at which sum p_k t^k, k = 0..n, is no longer positive; -1 if there is none."""
     if p[0] <= 0.0:
@@ -89,7 +89,7 @@ def first_root(p: NDArray[np.float64], n: int, h: float) -> float:
     return t
 
 
-@compiled("float64(float64[::1], int64, float64, float64, float64, float64, float64, float64, float64)")
+@compiled("float64(float64[::1], int64, float64, float64, float64, float64, float64, float64, float64)", internal=True)
 def greatest_magnitude(
     p: NDArray[np.float64],
     n: int,

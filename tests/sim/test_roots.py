@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from sim.excitation import SineProgram, Sweep
 from sim.kernel import roots
-from sim.kernel.roots import evaluate, first_root, greatest_magnitude
 from sim.specimen import Specimen
 from tests.sim import recurrences
+from tests.sim.recurrences import evaluate, first_root, greatest_magnitude
 
 COEFFICIENTS = st.lists(st.floats(-1.0, 1.0), min_size=3, max_size=12)
 GRID = np.linspace(0.0, 1.0, 4001)
@@ -67,12 +67,6 @@ def test_no_earlier_root_is_missed(coefficients: list[float]) -> None:
         assert abs(float(series.polyval(root, p))) < 1e-12
 
 
-def greatest(p: np.ndarray, start: float, h: float) -> float:
-    """Greatest magnitude of a polynomial in [start, h]."""
-    n = p.size - 1
-    return greatest_magnitude(p, n, start, h, *evaluate(p, n, start)[:2], *evaluate(p, n, h)[:2], 0.0)
-
-
 @settings(max_examples=100, deadline=None)
 @given(COEFFICIENTS, st.floats(0.0, 0.9))
 def test_no_peak_is_missed_or_invented(coefficients: list[float], start: float) -> None:
@@ -80,7 +74,7 @@ def test_no_peak_is_missed_or_invented(coefficients: list[float], start: float) 
     times = np.append(GRID[start <= GRID], start)
     sampled = np.abs(series.polyval(times, p)).max()
     curvature = sum(k * k * abs(c) for k, c in enumerate(coefficients))
-    found = greatest(p, start, 1.0)
+    found = greatest_magnitude(p, p.size - 1, start, 1.0)
     assert sampled * (1.0 - 1e-13) <= found <= sampled + curvature * 2.5e-4**2 + 1e-15
 
 
@@ -88,7 +82,7 @@ def test_the_work_stays_bounded_where_the_bounds_say_nothing() -> None:
     # sixteen roots in [-1, 2]: coefficients of a thousand for values of a billionth
     p = planted(*np.linspace(-0.97, 1.93, 16))
     assert 0.0 <= first_root(p, 16, 1.0) <= 1.0
-    assert greatest(p, 0.0, 1.0) >= abs(p[0])
+    assert greatest_magnitude(p, 16, 0.0, 1.0) >= abs(p[0])
 
 
 def first_step(scale: float, duration: float, omega: tuple[float, float]) -> tuple[np.ndarray, float]:
@@ -130,6 +124,6 @@ def test_peaks_of_tiny_motions_cost_no_more_than_those_of_others(
 
     ends = *evaluate(p, 16, 0.0)[:2], *evaluate(p, 16, h)[:2]
     monkeypatch.setattr(roots, "evaluate", counted)
-    found = cast(Any, greatest_magnitude).py_func(p, 16, 0.0, h, *ends, 0.0)
+    found = cast(Any, roots.greatest_magnitude).py_func(p, 16, 0.0, h, *ends, 0.0)
     sampled = np.abs(series.polyval(np.linspace(0.0, h, 20_001), p)).max()
     assert found == pytest.approx(sampled, rel=1e-6, abs=1e-300)

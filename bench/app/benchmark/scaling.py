@@ -128,7 +128,7 @@ def startup(warm_runs: int) -> Section:
     notes = (
         "On a machine under other load, processor time is more meaningful than elapsed time. A helper process compiles "
         "a part of the kernel at the same time.",
-        "About half of the compilation time is spent on the function that advances many members, which is compiled "
+        "Two thirds of the compilation time are spent on the function that advances many members, which is compiled "
         "last. Compilation is mostly the compiler's analysis in Python, not the optimisation of machine code.",
     )
     targets = (
@@ -137,7 +137,7 @@ def startup(warm_runs: int) -> Section:
             4.0,
             cold - warm,
             "s",
-            "The function that advances many members takes about half of it, nearly all for the compiler's analysis in "
+            "The function that advances many members takes two thirds of it, nearly all for the compiler's analysis in "
             "Python, which the second processor cannot share.",
         ),
         Target("warm start of predict steady, processor time", 0.9, warm_work, "s", STARTING),
@@ -149,11 +149,10 @@ def _run(cache: Path) -> tuple[float, float | None]:
     """Elapsed and processor time [s]; the latter is None where the system does not report it. Raises RockbenchError if
     the command fails.
     """
-    code = f"import sys; from bench.app.cli.main import main; sys.exit(main({list(COMMAND)!r}))"
     before = os.times()
     elapsed, done = once(
         lambda: subprocess.run(
-            [sys.executable, "-P", "-c", code],
+            [sys.executable, "-P", "-m", "bench", *COMMAND],
             env=os.environ | {"NUMBA_CACHE_DIR": str(cache)},
             capture_output=True,
             text=True,
