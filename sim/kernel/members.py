@@ -96,9 +96,9 @@ def advance_members(
     arguments = specimens, specimen_of, segments, spans, states, order, tolerance, theta_limit, rest_angle, peaks_from
     if advance_lanes(*arguments, impact_limit, reports, lanes):
         # compiled only when a block first rests under an acceleration that is not a sine
-        from sim.kernel.members_at_rest import advance_with_rest
+        from sim.kernel.members_at_rest import advance_with_rest, scratch
 
-        advance_with_rest(*arguments, impact_limit, reports, lanes)
+        advance_with_rest(*arguments, impact_limit, reports, lanes, *scratch())
 
 
 @inlined

@@ -29,29 +29,15 @@ from sim.kernel.workspace import (
 )
 
 
-def advance_with_rest(
-    specimens: Array,
-    specimen_of: Places,
-    segments: Array,
-    spans: Places,
-    states: Array,
-    n: int,
-    tolerance: float,
-    theta_limit: float,
-    rest_angle: float,
-    peaks_from: Array,
-    impact_limit: int,
-    reports: Array,
-    lanes: Workspace,
-) -> None:
-    """Take the exact steps requested by `advance_lanes`, then call it again, until every member has ended."""
-    scratch = np.zeros((LANES, TABLE_ROWS, 6)), np.zeros(SPACE), np.empty((0, 6))
-    arguments = specimens, specimen_of, segments, spans, states, n, tolerance, theta_limit, rest_angle, peaks_from
-    _advance(*arguments, impact_limit, reports, lanes, *scratch)
+def scratch() -> tuple[Array, Array, Array]:
+    """Arrays that `advance_with_rest` needs besides those of the lanes: propagators of the lanes, shape (LANES,
+    TABLE_ROWS, 6), scratch space, shape SPACE, and no samples, shape (0, 6).
+    """
+    return np.zeros((LANES, TABLE_ROWS, 6)), np.zeros(SPACE), np.empty((0, 6))
 
 
 @compiled(f"void({MEMBERS}, {WORK}, float64[:,:,::1], float64[:,:,::1], float64[:,::1])")
-def _advance(
+def advance_with_rest(
     specimens: Array,
     specimen_of: Places,
     segments: Array,
@@ -69,9 +55,8 @@ def _advance(
     space: Array,
     no_samples: Array,
 ) -> None:
-    """See `advance_with_rest`.
-
-    tables : propagator of every lane, shape (LANES, TABLE_ROWS, 6).  space : shape SPACE.  no_samples : shape (0, 6).
+    """Take the exact steps requested by `advance_lanes`, then call it again, until every member has ended. The last
+    three arguments are the arrays of `scratch`.
     """
     values, places, _, _, _, _, _, _, _, a1, c1, after, e = lanes
     asking = True
