@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from sim.errors import InvalidInput
 from sim.excitation import Excitation, SampledRecord
-from sim.linear import steady_peaks
-from sim.return_map import follow, jacobians, newton, parameters
+from sim.linear import bare_peaks, steady_peaks
+from sim.return_map import follow_each, jacobians, newton, parameters
 from sim.rocking import (
     LARGEST_PART,
     MOST_IMPACTS,
@@ -44,12 +44,14 @@ def simulate_many(
     peaks_from: float | Sequence[float] | None = 0.0,
     tolerance: float = TOLERANCE,
     overturning_angle: float = pi / 2,
+    rest_angle: float = REST_ANGLE,
     scheduler: str | None = None,
 ) -> list[Motion]:
     """Results of `simulate` for many runs, in order, computed on all processors.
 
     A single specimen, excitation, state or `peaks_from` applies to all runs. Everything is checked before the first run
-    starts. `scheduler` is that of `sim.sweep.sweep`.
+    starts. A block comes to rest when its next bounce stays below `rest_angle` [rad]; a larger one saves most of the
+    hundreds of impacts of decaying bounces. `scheduler` is that of `sim.sweep.sweep`.
 
     Raises InvalidInput if the sequences differ in length or a run is refused.
     """
@@ -73,6 +75,7 @@ def simulate_many(
             peaks_from[i] if isinstance(peaks_from, Sequence) else peaks_from,
             tolerance,
             overturning_angle,
+            rest_angle,
         )
         for i in range(runs)
     ]
@@ -90,7 +93,7 @@ def simulate_many(
 
 def side_by_side(runs: list[RockingRun]) -> list[Motion]:
     """Results of several runs, computed together and bit-identical to those of `RockingRun.motion`. The runs must have
-    no sample times, and must agree in order, tolerance and overturning angle.
+    no sample times, and must agree in order, tolerance, overturning angle and angle of rest.
     """
     from sim.kernel import members as kernel
 
@@ -110,7 +113,7 @@ def side_by_side(runs: list[RockingRun]) -> list[Motion]:
         runs[0].order,
         runs[0].tolerance,
         runs[0].overturning_angle,
-        REST_ANGLE,
+        runs[0].rest_angle,
         np.array([np.inf if run.peaks_from is None else run.peaks_from for run in runs]),
         MOST_IMPACTS,
         reports,
@@ -125,6 +128,9 @@ Floats = NDArray[np.float64]
 
 RUN_TOLERANCE = 1e-8
 """Integration tolerance of the runs under a record, far below the statistical error of an ensemble."""
+
+RUN_REST_ANGLE = 1e-8
+"""Angle of a bounce [rad] below which the block comes to rest in these runs, for the same reason."""
 
 _Member = tuple[Orbit, Specimen]
 """A known orbit, and the specimen whose orbit is searched for from there."""
@@ -156,7 +162,9 @@ def steady_gains(
     if not chunks:
         return np.empty((len(orbits), 0, 2))
     peaks = np.concatenate(sweep(_peaks, chunks, scheduler, done=done))
-    bare = np.array([_bare(specimen, orbit, bare_amplitude) for orbit, specimen in every])
+    omega = np.array([orbit.omega for orbit, _ in every])
+    amplitude = np.array([orbit.amplitude if bare_amplitude is None else bare_amplitude for orbit, _ in every])
+    bare = bare_peaks([specimen.frame for _, specimen in every], omega, amplitude)
     return (peaks / bare).reshape(len(orbits), -1, 2)
 
 
@@ -166,7 +174,7 @@ def record_gains(members: Sequence[Specimen], record: SampledRecord, scheduler: 
     NaN where the block overturns or the run fails.
     """
     every = [*members, *(specimen.bare() for specimen in members)]
-    runs = simulate_many(every, record, tolerance=RUN_TOLERANCE, scheduler=scheduler)
+    runs = simulate_many(every, record, tolerance=RUN_TOLERANCE, rest_angle=RUN_REST_ANGLE, scheduler=scheduler)
     peaks = np.array([(run.peaks.u1, run.peaks.drift) for run in runs]).reshape(2, -1, 2)
     stood = np.array([run.status is Status.COMPLETED for run in runs[: len(members)]], dtype=np.bool_)
     return np.where(stood[:, None], peaks[0] / peaks[1], np.nan)
@@ -195,13 +203,10 @@ def _rocking(chunk: Sequence[_Member]) -> Floats:
     of = np.array([place[id(orbit)] for orbit, _ in chunk])
     q = np.concatenate([parameters(specimen, orbit.omega, orbit.amplitude) for orbit, specimen in chunk])
     found = newton(q, sections[of], slopes[of], accuracy=None)
-    for i in np.flatnonzero(~found.found).tolist():
-        solution, _ = follow(origin[of[i]], sections[of[i]], q[i])
-        if solution is not None:
-            found.put(i, solution)
+    for k in range(len(orbits)):
+        missing = np.flatnonzero(~found.found & (of == k))
+        solutions = follow_each(origin[k], sections[k], q[missing]) if missing.size else []
+        for i, solution in zip(missing.tolist(), solutions, strict=True):
+            if solution is not None:
+                found.put(i, solution)
     return found.peaks[:, :2]
-
-
-def _bare(specimen: Specimen, orbit: Orbit, amplitude: float | None) -> tuple[float, float]:
-    peaks = steady_peaks(specimen, orbit.omega, orbit.amplitude if amplitude is None else amplitude)
-    return peaks.u1, peaks.drift

@@ -224,6 +224,7 @@ class RockingRun:
     peaks_from: float | None
     tolerance: float
     overturning_angle: float
+    rest_angle: float = REST_ANGLE
 
     def __post_init__(self) -> None:
         check_state(self.specimen, self.state, self.overturning_angle)
@@ -251,7 +252,7 @@ class RockingRun:
             self.tolerance,
             np.inf,
             self.overturning_angle,
-            REST_ANGLE,
+            self.rest_angle,
             np.inf if self.peaks_from is None else self.peaks_from,
             MOST_IMPACTS,
             report,

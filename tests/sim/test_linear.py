@@ -5,7 +5,7 @@ import pytest
 
 from sim.errors import InvalidInput
 from sim.excitation import SineProgram, Sweep
-from sim.linear import bare_modes, coupled_modes, frame_matrices, steady_peaks, steady_response
+from sim.linear import bare_modes, bare_peaks, coupled_modes, frame_matrices, steady_peaks, steady_response
 from sim.rocking import State, simulate
 from sim.specimen import Frame, Specimen
 from tests.sim.oracle import printed_rates
@@ -97,3 +97,13 @@ def test_frequency_must_be_positive(omega: float) -> None:
 def test_amplitude_must_be_finite() -> None:
     with pytest.raises(InvalidInput, match="amplitude"):
         steady_peaks(Specimen(), 10.0, float("nan"))
+
+
+def test_peaks_of_many_frames_are_those_of_each() -> None:
+    random = np.random.default_rng(1)
+    frames = [Frame(k1=k1) for k1 in random.uniform(80.0, 300.0, 30).tolist()]
+    omega, amplitude = random.uniform(1.0, 40.0, 30), random.uniform(0.1, 5.0, 30)
+    cases = zip(frames, omega.tolist(), amplitude.tolist(), strict=True)
+    each = [steady_peaks(Specimen(frame=frame), *motion) for frame, *motion in cases]
+    found = bare_peaks(frames, omega, amplitude)
+    assert found == pytest.approx(np.array([(peaks.u1, peaks.drift) for peaks in each]), rel=1e-14)

@@ -62,6 +62,18 @@ def test_every_member_has_the_bits_of_its_single_run(peaks_from: float | None) -
     assert max(motion.impacts for motion in motions) > 50
 
 
+def test_a_larger_angle_of_rest_saves_impacts_and_changes_no_peak_by_more() -> None:
+    specimens, motion = [Specimen(beta=beta) for beta in (0.25, 0.4, 0.64)], record(1.1)
+    exact, rough = (simulate_many(specimens, motion, rest_angle=angle) for angle in (1e-12, 1e-8))
+    for one, other in zip(exact, rough, strict=True):
+        assert one.status is other.status is Status.COMPLETED
+        assert 30 < other.impacts < 0.6 * one.impacts
+        assert one.peaks is not None
+        assert other.peaks is not None
+        assert other.peaks.drift == pytest.approx(one.peaks.drift, rel=1e-6)
+        assert other.peaks.theta == pytest.approx(one.peaks.theta, abs=1e-7)
+
+
 def test_a_member_that_fails_ends_alone() -> None:
     wild = State(v1=1e9, theta=0.01)
     motions = simulate_many(Specimen(beta=0.4), start(17.0), states=[State(), wild, State()])
