@@ -27,6 +27,7 @@ from bench.datafile.hdf5_creation import text_type as text_type
 from bench.datafile.hdf5_objects import all_values as all_values
 from bench.datafile.hdf5_objects import attribute_value as attribute_value
 from bench.datafile.hdf5_objects import attributes as attributes
+from bench.datafile.hdf5_objects import is_hard_link as is_hard_link
 from bench.datafile.hdf5_reading import Dataset as Dataset
 from bench.datafile.hdf5_reading import File as File
 from bench.datafile.hdf5_reading import Group as Group

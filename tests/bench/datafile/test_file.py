@@ -133,6 +133,11 @@ def lead_elsewhere(file: Any) -> None:
     file["entry/data/storey 1"] = h5py.SoftLink("/entry/instrument/storey 2/counts")
 
 
+def lead_to_equal_values(file: Any) -> None:
+    file["entry"].move("prediction/alpha_2", "prediction/moved")
+    file["entry/prediction/alpha_2"] = h5py.SoftLink("/entry/prediction/moved")
+
+
 def rename_class(file: Any) -> None:
     file["entry/instrument/table"].attrs["NX_class"] = "NXdetector"
 
@@ -157,6 +162,7 @@ def add_group(file: Any) -> None:
         (add_dataset, "/entry/added has no checksum"),
         (plot_another, "attributes or links of /entry/data were changed"),
         (lead_elsewhere, "attributes or links of /entry/data were changed"),
+        (lead_to_equal_values, "attributes or links of /entry/prediction were changed"),
         (rename_class, "attributes or links of /entry/instrument/table were changed"),
         (change_root, "attributes or links of / were changed"),
         (add_group, "/entry/added has no checksum"),
