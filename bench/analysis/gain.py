@@ -22,7 +22,7 @@ from bench.analysis.signals import ACCELERATION, DRIFT, LASER_1, LASER_2, U1
 from bench.analysis.uncertainty import COVERAGE as COVERAGE
 from bench.analysis.uncertainty import NOISE, Budget, combined_freedom
 
-SCATTER = "scatter of the cycles"
+SCATTER, TRANSIENT = "scatter of the cycles", "remaining transient"
 """Name of the contribution of the scatter to the budgets."""
 
 DRAWS, SEED = 4000, 1
@@ -245,7 +245,7 @@ def gain(
     scatter = coupled.scatter / coupled.drift, bare.scatter / bare.drift
     parts |= {
         SCATTER: hypot(*scatter),
-        "remaining transient": hypot(coupled.transient / coupled.drift, bare.transient / bare.drift),
+        TRANSIENT: hypot(coupled.transient / coupled.drift, bare.transient / bare.drift),
         "amplitude of the table": abs(amplitude_slope) * sensors.table_scale,
     }
     if coupled.noise or bare.noise:

@@ -155,7 +155,7 @@ class SpectrumCheck:
         return float(deviation[worst]), float(self._periods[worst])
 
     def _spectrum(self, acceleration: Array) -> Array:
-        # both errors of a pass, and those of the best drive, are asked for in turn
+        # both errors of a pass, and those of the best drive, are asked for in turn; a caller may reuse its array
         if not np.array_equal(acceleration, self._last[0]):
-            self._last = acceleration, pseudo_acceleration(acceleration, self._dt, self._periods, DAMPING)
+            self._last = acceleration.copy(), pseudo_acceleration(acceleration, self._dt, self._periods, DAMPING)
         return self._last[1]

@@ -4,7 +4,7 @@ from collections.abc import Generator
 from math import hypot
 
 from bench.analysis.cycles import Cycle
-from bench.analysis.gain import SteadyPeak, steady_peak
+from bench.analysis.gain import TRANSIENT, SteadyPeak, steady_peak
 from bench.analysis.running_gain import RunningGain
 from bench.analysis.sensor_accuracy import STEPS
 from bench.engine.steps import Outcome, Publish, Step
@@ -52,5 +52,5 @@ class RunningPoint:
         if self._gain is None or transient <= NEGLIGIBLE:
             return False
         found = self._gain.of(peak)
-        others = [part for name, part in found.budget.parts.items() if name not in ("remaining transient", STEPS)]
+        others = [part for name, part in found.budget.parts.items() if name not in (TRANSIENT, STEPS)]
         return transient > SHARE * hypot(*others) / found.alpha_2

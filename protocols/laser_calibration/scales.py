@@ -48,9 +48,16 @@ def calibrate(
     passes = reference.corrected(passes)
     curves = fit_curve(passes, 0, rests[0]), fit_curve(passes, 1, rests[1])
     require_agreement(curves)
-    common, days = reference.remaining, valid_days
     found = calibration(
-        passes, curves, rests, devices, accuracy, ranges, common_linearity=common, valid_days=days, date=date
+        passes,
+        curves,
+        rests,
+        devices,
+        accuracy,
+        ranges,
+        common_linearity=reference.remaining,
+        valid_days=valid_days,
+        date=date,
     )
     return found, curves, reference
 

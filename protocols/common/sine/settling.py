@@ -143,6 +143,7 @@ def settle_and_measure(
     while True:
         ready = over or (waited >= SHORTEST and detector.judge().steady)
         asked = measured if ready else INTERVAL
+        again = False
         outcome = yield Dwell(asked)
         if not isinstance(outcome, Measured):
             return Fallen()
@@ -163,23 +164,21 @@ def settle_and_measure(
                 if steadiness.steady:
                     peak = steady_peak(used, sine.omega, before=preceding(list(constant), used), frame=frame)
                     measurements += 1
-                    if waiting is not None and not over and measurements < MOST and waiting(peak):
-                        recent.extend(cycles)
-                        yield from report(list(recent))
-                        over = waited >= limit
-                        continue
+                    again = waiting is not None and not over and measurements < MOST and waiting(peak)
                 else:
                     kept = list(constant)
                     motion = free_motion(kept, sine.omega)
                     peak = motion.peaks.greatest
                     orbit = orbit_peak(kept, motion, sine.omega)
                 state = TableState(turn, drive, complex(table.achieved[0] / table.played[0]))
-                return Settled(
-                    peak, steadiness, waited, table.amplitude_error, table.phase_error, updates, motion, orbit, state
-                )
+                errors = table.amplitude_error, table.phase_error
+                if not again:
+                    return Settled(peak, steadiness, waited, *errors, updates, motion, orbit, state)
         recent.extend(cycles)
         yield from report(list(recent))
         over = waited >= limit
+        if again:
+            continue
         if waited >= last_correction:
             # the same allowance as in the verdict at the limit
             if over or not detector.judge(allowance=2.0).steady:
