@@ -23,7 +23,7 @@ from bench.analysis.uncertainty import COVERAGE as COVERAGE
 from bench.analysis.uncertainty import NOISE, Budget, combined_freedom
 
 SCATTER, TRANSIENT = "scatter of the cycles", "remaining transient"
-"""Name of the contribution of the scatter to the budgets."""
+"""Names of the contributions of the scatter and of a transient to the budgets."""
 
 DRAWS, SEED = 4000, 1
 """Number of Monte Carlo draws of the sensors' errors; with this number, the expanded uncertainty has a statistical

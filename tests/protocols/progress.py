@@ -1,10 +1,33 @@
-"""The progress of a run ends at its end: everything is done, and nothing is left."""
+"""Runs with their events, whose progress ends at the end: everything is done, and nothing is left."""
 
 from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import pytest
 
-from bench.events import Event, Progress
+from bench.app.session import SessionResult, run_session
+from bench.engine.interface import Requests, Unattended
+from bench.events import Acquired, Event, Progress
+from bench.protocol import Protocol
+
+
+def followed(
+    protocol: Protocol[Any], prepared: Any, out: Path, *, figures: bool = False
+) -> tuple[SessionResult, list[Event]]:
+    """Carry out a prepared run in virtual time, without a person; its result, and its events without samples."""
+    events: list[Event] = []
+    result = run_session(
+        protocol if figures else replace(protocol, figures=()),
+        prepared,
+        out=out,
+        operator=Unattended(),
+        subscribers=[lambda event: None if isinstance(event, Acquired) else events.append(event)],
+        requests=Requests(),
+        realtime=False,
+    )
+    return result, events
 
 
 def ends_at_100_percent(events: Sequence[Event]) -> None:

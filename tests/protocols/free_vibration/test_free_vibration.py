@@ -1,7 +1,6 @@
 """Free vibration and springs end to end, on virtual benches that are not as they are assumed to be."""
 
 import json
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,7 @@ from bench.analysis.free_decay.stretch import Unusable
 from bench.analysis.uncertainty import in_brackets, plus_minus
 from bench.app.catalogue import load_protocol
 from bench.app.preflight import compile_run
-from bench.app.session import SessionResult, run_session
+from bench.app.session import SessionResult
 from bench.config.model import BenchConfiguration
 from bench.config.result_files import read_specimen
 from bench.config.sections import Acquisition, Simulation
@@ -23,9 +22,8 @@ from bench.datafile.inspection import verify
 from bench.datafile.reader import open_datafile
 from bench.document.campaign import Campaign
 from bench.document.document import Picture, Table
-from bench.engine.interface import Requests, Unattended
 from bench.engine.steps import Arm, Done, OperatorAction, Plan
-from bench.events import Acquired, Event, OperatorAsked, StepStarted, Warned
+from bench.events import Event, OperatorAsked, StepStarted, Warned
 from bench.findings import FitFinished
 from bench.guard.limits import Limits
 from bench.protocol import Prepared, Protocol
@@ -43,7 +41,7 @@ from sim.parameters import Parameters
 from sim.sensors import Laser
 from sim.specimen import Frame, Specimen
 from sim.virtual_bench import VirtualBenchParameters
-from tests.protocols.progress import ends_at_100_percent
+from tests.protocols.progress import ends_at_100_percent, followed
 
 TRUE = Frame(k1=1.04 * 213.44, k2=0.96 * 56.45, xi1=0.013, xi2=0.028)
 SPRING = 1.08
@@ -70,18 +68,8 @@ def prepared(parameters: Parameters, configuration: BenchConfiguration) -> Prepa
 def run(
     parameters: Parameters, configuration: BenchConfiguration, out: Path, *, figures: bool = False
 ) -> tuple[SessionResult, list[Event]]:
-    events: list[Event] = []
     protocol = FRAME if isinstance(parameters, FreeVibrationParameters) else SPRINGS
-    result = run_session(
-        protocol if figures else replace(protocol, figures=()),
-        prepared(parameters, configuration),
-        out=out,
-        operator=Unattended(),
-        subscribers=[lambda event: None if isinstance(event, Acquired) else events.append(event)],
-        requests=Requests(),
-        realtime=False,
-    )
-    return result, events
+    return followed(protocol, prepared(parameters, configuration), out, figures=figures)
 
 
 def close(finding: Finding | None, truth: float) -> bool:

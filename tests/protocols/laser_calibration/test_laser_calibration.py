@@ -17,16 +17,13 @@ from bench.analysis.sensor_accuracy import LINEARITY, SCALES, SensorAccuracy, Se
 from bench.analysis.signals import ACCELERATION, DISPLACEMENT, DRIFT, LASER_1, LASER_2, SIGNALS, U1, SignalMap
 from bench.app.catalogue import load_protocol
 from bench.app.cli.main import main
-from bench.app.session import run_session
 from bench.config.model import BenchConfiguration
 from bench.config.result_files import read_calibration, write_calibration
 from bench.config.sections import Acquisition, Simulation
 from bench.config.template import as_toml
 from bench.config.toml import read_configuration
 from bench.datafile.reader import open_datafile
-from bench.engine.interface import Requests, Unattended
 from bench.engine.steps import AcquireAtRest, Done, OperatorAction, RestSamples
-from bench.events import Acquired, Event
 from drivers.rig import Channel, OperatorTask
 from protocols.common.calibrate import Unmeasurable
 from protocols.laser_calibration.curves import HARMONICS, ErrorCurve, Pass, fit_curve, mean_pass
@@ -37,7 +34,7 @@ from sim.channel import STOREYS
 from sim.errors import InvalidInput
 from sim.sensors import Laser
 from sim.virtual_bench import VirtualBenchParameters
-from tests.protocols.progress import ends_at_100_percent
+from tests.protocols.progress import ends_at_100_percent, followed
 
 PROTOCOL = load_protocol("laser-calibration")
 RANGE = 0.2
@@ -418,21 +415,14 @@ def test_a_calibration_on_the_simulated_bench_agrees_with_its_lasers_and_serves_
 
 def test_an_error_with_short_waves_is_found_and_the_progress_ends_at_100_percent(tmp_path: Path) -> None:
     """Five and a half periods over the range; ten harmonics of each cycle would leave 21 um of it."""
-    out, periods, events = tmp_path / "out", 5.5, list[Event]()
+    out, periods = tmp_path / "out", 5.5
     laser = Laser(linearity_periods=periods)
     bench = VirtualBenchParameters(sample_rate=1000.0, laser_1=laser, laser_2=laser)
     configuration = BenchConfiguration(
         acquisition=Acquisition(block_duration=0.2), simulation=Simulation(bench=bench, seed=5)
     )
-    result = run_session(
-        replace(PROTOCOL, figures=()),
-        PROTOCOL.prepare(LaserCalibrationParameters(passes=6, cycles=4), configuration, None),
-        out=out,
-        operator=Unattended(),
-        subscribers=[lambda event: None if isinstance(event, Acquired) else events.append(event)],
-        requests=Requests(),
-        realtime=False,
-    )
+    prepared = PROTOCOL.prepare(LaserCalibrationParameters(passes=6, cycles=4), configuration, None)
+    result, events = followed(PROTOCOL, prepared, out)
     assert result.status == "completed", result.reason
     ends_at_100_percent(events)
     one = read_calibration(out / "laser_calibration.json")
