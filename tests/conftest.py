@@ -152,7 +152,6 @@ def pytest_collection() -> Generator[None, Any, Any]:
 
 def pytest_collection_finish() -> None:
     """What is there when the first test begins stays until the end: the garbage collector need not look at it."""
-    gc.collect()
     gc.freeze()
     # garbage in cycles is small, and may wait
     gc.set_threshold(20_000, 20, 20)

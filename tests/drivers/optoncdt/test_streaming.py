@@ -159,7 +159,8 @@ def test_the_rate_is_counted_where_the_sensor_does_not_report_it(
                 laser.start()
         finally:
             over.set()
-            sender.join()
+            sender.join(LONG)
+            assert not sender.is_alive()
 
 
 def test_a_sensor_that_restarts_with_its_factory_settings_is_told_as_that() -> None:
