@@ -4,9 +4,11 @@ The Birge ratio, the square root of chi2 / (R - 1), shows whether R repeats scat
 (Birge, Physical Review 40 (1932) 207). Where it exceeds 1, the same term is added to each variance to reduce the ratio
 to 1 (Mandel and Paule, Analytical Chemistry 42 (1970) 1194), so that a dominant scatter makes the weights equal. A few
 repeats determine the scatter only roughly, so its contribution follows Student's t with R - 1 degrees of freedom: it is
-enlarged until +-1.96 times the combined uncertainty covers 95 %, as for other uncertainties (GUM:2008, G.4). If the
-scatter is one to four times as large as stated, repeats may agree by chance: the interval then covers 87 % for two
-repeats, 91 % for three, and 93 % for five or more.
+enlarged until +-1.96 times the combined uncertainty covers 95 %, as for other uncertainties (GUM:2008, G.4). Five and
+more repeats whose scatter has a probability above 20 % under the stated uncertainties are consistent with them (test of
+Cox, Metrologia 39 (2002) 589), and nothing is added, as this would make most intervals of consistent repeats too wide.
+If the scatter is one to four times as large as stated, repeats may agree by chance: the interval then covers 87 % for
+two repeats, 91 % for three, and 92 % for five or more.
 """
 
 import json
@@ -23,6 +25,8 @@ NOISE = "noise of the peaks"
 """Name of the contribution of noise to the budget of a peak that is taken from samples."""
 
 _LEVEL = 0.975
+_TESTED, _CONSISTENT = 5, 0.2
+"""Fewest repeats that are tested for consistency, and the probability above which they are consistent."""
 _STEPS, _CLOSE = 200, 1e-10
 
 
@@ -45,8 +49,9 @@ def mean_of_repeats(values: ArrayLike, variances: ArrayLike) -> Repeats:
     number = len(found)
     added, birge = np.zeros(found.shape[1]), np.full(found.shape[1], np.nan)
     if number > 1:
-        birge = np.sqrt(np.sum(_squares(found, own), axis=0) / (number - 1))
-        added = _addition(found, own)
+        squares = np.sum(_squares(found, own), axis=0)
+        birge = np.sqrt(squares / (number - 1))
+        added = np.where(_consistent(squares, number), 0.0, _addition(found, own))
     weights = _weights(own + added)
     spread = np.sqrt(added * np.sum(weights**2, axis=0))
     return Repeats(np.sum(weights * found, axis=0), weights, student_factor(number) * spread, birge)
@@ -74,6 +79,13 @@ def _weights(variances: Array) -> Array:
 
 def _squares(values: Array, variances: Array) -> Array:
     return (values - np.sum(_weights(variances) * values, axis=0)) ** 2 / variances
+
+
+def _consistent(squares: Array, number: int) -> NDArray[np.bool_]:
+    """Whether chi2, shape (n,), of `number` repeats shows no scatter beyond the stated uncertainties."""
+    from scipy.special import chdtrc
+
+    return (number >= _TESTED) & (chdtrc(number - 1, squares) > _CONSISTENT)
 
 
 def _addition(values: Array, variances: Array) -> Array:

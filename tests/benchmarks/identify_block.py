@@ -6,8 +6,9 @@
 Each repeat is a bench of its own seed, a laser with a scale error within 0.2 % and a linearity error of the size that
 the data sheet allows with any phase, and a block of the size that is stated whose r / r_th is drawn from 0.98 to 1. Its
 tilts are recorded one after the other, without the engine, and analyse_tilt as a session does. With --as-drawn, waves
-of the linearity error and the difference of the clocks are drawn as well, from the distributions that the analysis
-assumes: that is what its intervals promise. Without, they are the default bench's, which the analysis does not know.
+of the linearity error, the difference of the clocks and the height of the laser's beam are drawn as well, from the
+distributions that the analysis assumes: that is what its intervals promise. Without, they are the default bench's,
+which the analysis does not know.
 
 With --scatter the restitution of each impact is drawn about its mean, relative, and the motion is that of the closed
 form, as no virtual bench has such a block; the laser has noise of 10 um and no other error.
@@ -52,7 +53,8 @@ def repeat(seed: int, *, as_drawn: bool) -> list[Estimate]:
     asked, nominal = FreeRockingParameters(), Specimen()
     true = Specimen(block=Block(restitution_factor=factor)).coupled(0.0)
     bench = VirtualBench(VirtualBenchParameters(laser_2=laser), true, seed)
-    tilts = [_recorded(bench, true, nominal, asked, tilt) for tilt in planned_tilts(asked, nominal)]
+    height = asked.height + (float(random.normal(0.0, asked.height_uncertainty)) if as_drawn else 0.0)
+    tilts = [_recorded(bench, true, nominal, asked, tilt, height) for tilt in planned_tilts(asked, nominal)]
     found = findings(
         tilts, LaserErrors(SensorAccuracy(), laser.measuring_range), asked.height, asked.height_uncertainty
     )
@@ -103,10 +105,16 @@ def scattered(seed: int, *, scatter: float) -> list[Estimate]:
 
 
 def _recorded(
-    bench: VirtualBench, true: Specimen, nominal: Specimen, asked: FreeRockingParameters, tilt: PlannedTilt
+    bench: VirtualBench,
+    true: Specimen,
+    nominal: Specimen,
+    asked: FreeRockingParameters,
+    tilt: PlannedTilt,
+    height: float,
 ) -> Tilt:
+    """A tilt that the laser watches at `height` [m]."""
     rate = bench.parameters.sample_rate
-    bench.mount(Arrangement(true, table_locked=True, watched=asked.height, tilt=tilt.angle))
+    bench.mount(Arrangement(true, table_locked=True, watched=height, tilt=tilt.angle))
     bench.run(np.zeros(round(WARM_UP * rate)))
     bench.arm()
     counts = bench.run(np.zeros(round(tilt.recording * rate)))

@@ -9,7 +9,7 @@ absorbs its smooth part. Averaged over the phase, its mean square is that of two
 Timing: a laser with a free-running clock delays its values by up to one measuring period. The delay grows with the
 difference between the clocks and may jump back at any moment of a recording.
 
-Noise and resolution are contained in the residual of a fit.
+Noise and resolution are contained in the residual of a fit, as is a part of the errors of timing.
 """
 
 from collections.abc import Sequence
@@ -109,18 +109,31 @@ class LaserErrors:
 
     def linearity(self, fit: RockingFit) -> Array:
         """Shifts of the values and of the trend due to the components of the linearity error, shape (9, components)."""
-        return _carried(fit, self._components(fit.fitted - fit.values[ZERO]))
+        return fit.carried(self._components(fit.fitted - fit.values[ZERO]))
 
-    def timing(self, fit: RockingFit) -> Array:
-        """Standard uncertainty of the values and of the trend due to the laser's free-running clock, shape (9,)."""
+    def noise_and_timing(self, fit: RockingFit) -> Array:
+        """Standard uncertainties of the values and of the trend due to noise and to the laser's free-running clock,
+        shape (2, 9).
+
+        Variances of the residual above those that the clock is expected to leave there are noise. Where they are below,
+        the clock has wandered less, and its contribution is smaller in the same proportion.
+        """
+        delayed = self._delayed(fit)
+        found = fit.variances(fit.residual[:, None])[:, 0]
+        expected = np.mean(fit.variances(fit.left_by(delayed)), axis=1)
+        share = np.minimum(found, expected) / np.maximum(expected, np.finfo(np.float64).tiny)
+        timing = share * np.mean(fit.carried(delayed) ** 2, axis=1)
+        return np.sqrt(np.array([np.maximum(found - expected, 0.0), timing]))
+
+    def _delayed(self, fit: RockingFit) -> Array:
+        """Equally likely errors of the displacement [m] due to the laser's free-running clock, shape (n, k)."""
         longest = self.accuracy.laser_timing
         if longest == 0.0:
-            return np.zeros(fit.values.size + 1)
+            return np.zeros((fit.times.size, 1))
         rate, phase = np.meshgrid(CLOCK / longest * _middles(-1.0, 1.0, _RATES), _middles(0.0, 1.0, _PHASES))
         delay = longest * ((rate.ravel() * fit.times[:, None] + phase.ravel()) % 1.0)
         # a delayed signal is equivalent to a later release
-        changes = _carried(fit, fit.jacobian[:, [START]] * delay)
-        return np.sqrt(np.mean(changes**2, axis=1))
+        return fit.jacobian[:, [START]] * delay
 
     def of_relation(self, relation: Relation, fit: RockingFit) -> Array:
         """Shifts of r, as determined by the amplitude relation, due to the components of the linearity error, shape
@@ -142,10 +155,6 @@ class LaserErrors:
 def _middles(low: float, high: float, count: int) -> Array:
     """The midpoints of `count` equal parts of the range from `low` to `high`, shape (count,)."""
     return low + (high - low) * (np.arange(count) + 0.5) / count
-
-
-def _carried(fit: RockingFit, error: Array) -> Array:
-    return np.vstack((fit.gain @ error, fit.trend_gain @ error))
 
 
 @dataclass(frozen=True)
@@ -243,8 +252,7 @@ def findings(tilts: Sequence[Tilt], laser: LaserErrors, height: float, height_un
     """
     fits = [tilt.fit for tilt in tilts]
     linearity = np.array([laser.linearity(fit) for fit in fits])
-    timing = np.array([laser.timing(fit) for fit in fits])
-    noise = np.array([np.append(np.sqrt(np.diag(fit.covariance)), fit.trend_uncertainty) for fit in fits])
+    noise, timing = np.array([laser.noise_and_timing(fit) for fit in fits]).transpose(1, 0, 2)
     values = np.array([np.append(fit.values, fit.trend) for fit in fits])
     scale = hypot(laser.accuracy.laser_slope, height_uncertainty / height)
 
@@ -274,5 +282,5 @@ def uncertainties(fit: RockingFit, laser: LaserErrors, height: float, height_unc
     common = np.zeros(fit.values.size)
     common[ALPHA] = fit.values[ALPHA] * hypot(laser.accuracy.laser_slope, height_uncertainty / height)
     common[P] = fit.values[P] * laser.accuracy.timebase
-    carried = np.linalg.norm(laser.linearity(fit), axis=1) ** 2 + laser.timing(fit) ** 2
-    return np.sqrt(np.diag(fit.covariance) + carried[:-1] + common**2)
+    shifts = np.column_stack((laser.linearity(fit), laser.noise_and_timing(fit).T))
+    return np.hypot(np.linalg.norm(shifts, axis=1)[:-1], common)

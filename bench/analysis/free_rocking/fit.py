@@ -99,15 +99,24 @@ class RockingFit:
         """Change of r from zero impact speed to that of a fall from alpha, by one linearised step from zero trend."""
         return float(self.trend_gain @ self.residual)
 
-    @property
-    def covariance(self) -> Array:
-        """Covariance of the values from the residual, shape (8, 8)."""
-        return self._scattered(self.gain)
+    def carried(self, errors: Array) -> Array:
+        """Changes of values and trend, shape (9, k), due to `errors` of the displacement [m], shape (n, k)."""
+        return np.vstack((self.gain @ errors, self.trend_gain @ errors))
 
-    @property
-    def trend_uncertainty(self) -> float:
-        """Standard uncertainty of the trend from the residual."""
-        return float(np.sqrt(self._scattered(self.trend_gain[None, :])[0, 0]))
+    def variances(self, residuals: Array) -> Array:
+        """Variances of the values and of the trend, shape (9, k), due to errors that leave `residuals` [m], shape (n,
+        k), and are correlated only within a half swing: the cluster sum of Liang and Zeger (1986), with the usual
+        factor for few clusters.
+        """
+        starts = np.flatnonzero(np.diff(self.swing, prepend=-1))
+        gains = np.vstack((self.gain, self.trend_gain))
+        sums = np.array([np.add.reduceat(gain[:, None] * residuals, starts, axis=0) for gain in gains])
+        count, parameters = starts.size, len(NAMES)
+        return np.sum(sums**2, axis=1) * (count / (count - parameters))
+
+    def left_by(self, errors: Array) -> Array:
+        """Residuals that `errors` of the displacement [m] leave, both of shape (n, k)."""
+        return errors - self.jacobian[:, :-1] @ (self.gain @ errors)
 
     def straightened(self, displacement: Array) -> Array:
         """A laser signal [m], any shape, relative to its value for the block at rest and without the fitted
@@ -115,16 +124,6 @@ class RockingFit:
         """
         seen = displacement - self.values[ZERO]
         return seen - self.values[BEND_2] * seen**2 - self.values[BEND_3] * seen**3
-
-    def _scattered(self, gain: Array) -> Array:
-        """Covariance of `gain` @ residual, with contributions that are correlated only within a half swing: the cluster
-        sum of Liang and Zeger (1986), with the usual factor for few clusters.
-        """
-        parts = gain * self.residual
-        starts = np.flatnonzero(np.diff(self.swing, prepend=-1))
-        sums = np.add.reduceat(parts, starts, axis=1)
-        count, parameters = starts.size, len(NAMES)
-        return sums @ sums.T * (count / (count - parameters))
 
 
 def fit_rocking(seen: Recording, swings: Swings, points: Points, alpha: float, p: float) -> RockingFit:

@@ -5,6 +5,7 @@ from functools import cached_property
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from scipy import signal
 
 from bench.analysis.free_rocking.findings import LaserErrors, Tilt, analyse_tilt, combined, findings
@@ -153,7 +154,7 @@ def test_stated_uncertainties_are_those_of_repetition() -> None:
         started = signal.sosfilt_zi(card) * seen.displacement[0]
         filtered, _ = signal.sosfilt(card, seen.displacement, zi=started)
         found = analyse_tilt(replace(seen, displacement=np.asarray(filtered)), SPECIMEN, LEAST)
-        values, spread = found.fit.values, np.sqrt(np.diag(found.fit.covariance))
+        values, spread = found.fit.values, np.sqrt(found.fit.variances(found.fit.residual[:, None])[:, 0])
         relation = found.relation
         errors.append([values[R] - true.restitution, values[P] - P_TRUE, relation.restitution - true.restitution])
         stated.append([spread[R], spread[P], relation.uncertainty])
@@ -181,19 +182,23 @@ def test_errors_of_the_laser_are_carried_as_large_as_they_are() -> None:
     assert np.all((ratio > 0.6) & (ratio < 1.6)), ratio
 
 
-def test_a_delay_that_falls_back_moves_r_as_stated() -> None:
+def test_a_delay_that_falls_back_moves_r_as_stated_and_is_not_noise() -> None:
     true, laser = motion(0.5), LaserErrors(SensorAccuracy(laser_linearity=0.0), 0.2)
-    plain = tilt(true, Shown(noise=1e-8))
-    stated = laser.timing(plain.fit)[R]
-    random, shifts = np.random.default_rng(5), []
+    plain = tilt(true, Shown(noise=5e-6))
+    random, shifts, stated = np.random.default_rng(5), list[float](), list[NDArray[np.float64]]()
     for _ in range(10):
         rate, phase = random.uniform(-0.2, 0.2), random.uniform()
         times = plain.recording.times
         late = np.interp(times - 2.5e-4 * ((rate * times + phase) % 1.0), times, plain.recording.displacement)
-        shifts.append(
-            analyse_tilt(replace(plain.recording, displacement=late), SPECIMEN, LEAST).fit.values[R] - true.restitution
-        )
-    assert np.sqrt(np.mean(np.square(shifts))) / stated == pytest.approx(1.0, abs=0.4)
+        fit = analyse_tilt(replace(plain.recording, displacement=late), SPECIMEN, LEAST).fit
+        shifts.append(float(fit.values[R]) - true.restitution)
+        stated.append(laser.noise_and_timing(fit)[:, R])
+    noise, timing = np.array(stated).T
+    assert np.sqrt(np.mean((shifts / np.hypot(noise, timing)) ** 2)) == pytest.approx(1.0, abs=0.4)
+    # the residual is that of the delays, which count once
+    assert np.linalg.norm(noise) < 0.5 * np.linalg.norm(timing)
+    # a clock that does not wander leaves less
+    assert np.linalg.norm(laser.noise_and_timing(plain.fit)[:, R]) < 0.3 * timing.max()
 
 
 def test_the_uncertainty_of_a_weighted_sum_counts_what_neighbours_share() -> None:
