@@ -41,6 +41,8 @@ def assert_honest(study: Study, benches: int) -> None:
                 ("alpha_2, short waves, 16, 0.4", 40),
                 ("record, default, l-aquila, 0.25", 40),
                 ("record, short waves, pacoima, 0.97", 40),
+                ("record, calibrated, l-aquila, 0.25", 10),
+                ("alpha_2, calibrated, 16, 0.4", 10),
                 ("frame, pulse", 40),
                 ("block", 40),
                 ("multiplier, 15, 0.97", 20),

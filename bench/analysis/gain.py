@@ -130,7 +130,7 @@ def steady_peak(
 @lru_cache(maxsize=64)
 def without_rounding(peak: SteadyPeak, omega: float, step: float) -> SteadyPeak:
     """A peak at `omega` [rad/s], without the rounding errors of the lasers' outputs with steps of `step` [m], for each
-    laser whose errors can be estimated. This takes up to half a second: not while the table is driven.
+    laser whose errors can be estimated. This takes up to a second: not while the table is driven.
     """
     readings, fitted = peak.readings, peak.readings.fitted
     if fitted is None or not peak.used:

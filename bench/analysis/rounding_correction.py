@@ -27,14 +27,15 @@ from bench.analysis.cycles import TRACES, Cycle, harmonic_basis
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-FEWEST = 18.0
+FEWEST = 17.0
 """Fewest steps within the swing of a reading for a correction: with fewer, several positions of the steps have nearly
 the same residual, and the stated variances are too small.
 """
 
-SEVERAL = 60.0
-"""Number of steps within the swing below which the estimation is begun at several positions of the steps, since it may
-end at a wrong one.
+SEVERAL, SEPARATE = 60.0, 24.0
+"""Numbers of steps within the swing below which the estimation is begun at several positions of the steps, since it may
+end at a wrong one, and below which these positions are independent in the upper and the lower half: the fitted swing is
+then not accurate enough to relate them.
 """
 
 MODEL = 0.25
@@ -54,8 +55,10 @@ converter and for other low-passes.
 """
 _ROUNDS, _DAMPING = 6, 0.7
 """Number of estimations, and share of the change of the corrected motion that is applied after each of them."""
-_STARTS, _START_SMOOTHING = 12, 0.1
-"""Number of positions at which the estimation is begun, and the smoothing at its beginning."""
+_STARTS, _EACH, _START_SMOOTHING = 12, 8, 0.1
+"""Number of positions at which the estimation is begun, number of positions in each half if they are separate, and the
+smoothing at the beginning.
+"""
 
 _ORDERS: Array = np.arange(1.0, _TERMS + 1.0)
 _TURNS: Complex = np.exp(-1j * np.outer(np.arange(_POSITIONS) * (tau / _POSITIONS), _ORDERS))
@@ -87,7 +90,7 @@ def rounding(
     cutoff = max(judged, key=lambda each: judged[each].evidence)
     starts = [judged[cutoff].error]
     if sawtooth.swing < SEVERAL * step:
-        starts += sawtooth.filtered(omega, cutoff).starts()
+        starts += sawtooth.filtered(omega, cutoff).starts(separate=sawtooth.swing < SEPARATE * step)
     ends = [end for end in (fit.repeated(start, cutoff) for start in starts) if end is not None]
     if not ends:
         return None
@@ -136,10 +139,14 @@ class _Sawtooth:
         response = response * np.exp(s * float(np.sum(-1.0 / poles).real))
         return replace(self, spectra=self.spectra * np.where(self.orders < 0.0, response.conj(), response))
 
-    def starts(self) -> list[Complex]:
-        """Errors of the fit for `_STARTS` positions of the steps."""
-        terms = _amplitudes(self.step, np.array([_START_SMOOTHING])) * _TURNS[:: _POSITIONS // _STARTS]
-        return [self.error(total) for total in terms @ self.spectra.sum(axis=1)]
+    def starts(self, *, separate: bool) -> list[Complex]:
+        """Errors of the fit for several positions of the steps, which may be `separate` in the two halves."""
+        number = _EACH if separate else _STARTS
+        terms = _amplitudes(self.step, np.array([_START_SMOOTHING])) * _TURNS[:: _POSITIONS // number]
+        upper, lower = (terms @ self.spectra[:, half] for half in (0, 1))
+        if separate:
+            return [self.error(high + low) for high in upper for low in lower]
+        return [self.error(total) for total in upper + lower]
 
     def error(self, total: Complex) -> Complex:
         """Complex amplitudes of the fitted harmonics of the imaginary part of a spectrum."""

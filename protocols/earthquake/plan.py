@@ -274,9 +274,11 @@ class EarthquakePlan:
 
     def _observed(self, shaking: Shaking, signals: NDArray[np.float64]) -> Observed:
         """Evaluate the signals of a record. The zero from momentum has the errors of the lasers at all places of the
-        motion: it is evaluated if the shapes of these errors were checked.
+        motion: it is evaluated if these errors were calibrated or their shapes checked.
         """
-        frame = linear_frame(self._configuration) if self._correction.sensors.checks else None
+        sensors = self._correction.sensors
+        known = bool(sensors.checks) or sensors.calibration is not None
+        frame = linear_frame(self._configuration) if known else None
         return observe(signals, shaking.target.rest, shaking.target.sample_rate, frame)
 
     def _play(

@@ -27,6 +27,9 @@ from tests.benchmarks.estimates import Estimate, Statistics
 LOWEST, STRENGTH = 0.8, 1.3
 """Lowest frequency of a record [Hz], and its peak over the uplift acceleration."""
 
+PAUSE = 60.0
+"""Longest pause between the tests [s], in which the clock of a laser wanders by several measuring periods."""
+
 DRAWS = 4000
 
 FRAME = LinearFrame(Specimen().bare(), grounded=True)
@@ -89,13 +92,14 @@ def measured(seed: int, name: str, beta: float, case: Case, *, checked: bool = F
     the motions.
     """
     bare, coupled = motion_under(name, None), motion_under(name, beta)
-    sensors = Sensors(seed, case)
-    found = sensors.calibrated() if case.calibrated else None
+    sensors = Sensors(seed, case, pause=PAUSE)
+    found = sensors.calibrated()[0] if case.calibrated else None
     checks = None
     if checked:
         check, moved = check_and_motion()
         checks = check.evaluate(sensors.signals(moved, found)[REST:], BenchConfiguration())
-    frame, accuracy = FRAME if checked else None, SensorUncertainty(ACCURACY, RANGES, found).corrected_by(checks)
+    accuracy = SensorUncertainty(ACCURACY, RANGES, found).corrected_by(checks)
+    frame = FRAME if checked or case.calibrated else None
     correction = ReadingCorrection(accuracy)
     tests = [observe(correction(sensors.signals(motion, found)), REST, RATE, frame) for motion in (bare, coupled)]
     seen = [each.drift for each in with_better_zero(tests[0], tests[1], accuracy, DRAWS, seed)]

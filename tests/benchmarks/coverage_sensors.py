@@ -93,10 +93,12 @@ class Motion:
 
 
 class Sensors:
-    """The sensors of one bench."""
+    """The sensors of one bench. `pause` [s] is the longest time before a motion: the longer, the less related are the
+    ages of a laser's held readings in two tests.
+    """
 
-    def __init__(self, seed: int, case: Case = CASES["default"]) -> None:
-        self.random = np.random.default_rng([seed, 1])
+    def __init__(self, seed: int, case: Case = CASES["default"], *, pause: float = 1.0) -> None:
+        self.random, self.pause = np.random.default_rng([seed, 1]), round(pause * RATE)
         self.case, on = case, {name: 0.0 if name in case.off else 1.0 for name in SOURCES}
         scales = on["scales"] * ACCURACY.laser_mismatch / np.sqrt(2.0) * self.random.standard_normal(2)
         waves = self.random.uniform(*case.waves, 2)
@@ -153,7 +155,7 @@ class Sensors:
 
     def _laser(self, number: int, seen: Array, speed: Array) -> Array:
         stream = self.lasers[number].stream(RATE, self.seeds[number])
-        before = int(self.random.integers(0, 2000))
+        before = int(self.random.integers(0, self.pause))
         # the storeys come to rest within one step of the laser's output
         rest = self.rest[number] + ACCURACY.laser_resolution * float(self.random.uniform(-0.5, 0.5))
         here = np.concatenate((np.zeros(before), seen)) + rest

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from bench.analysis.reading_correction import ReadingCorrection
-from bench.analysis.sensor_accuracy import LINEARITY
+from bench.analysis.sensor_accuracy import LINEARITY, STEPS
 from bench.analysis.signals import ACCELERATION, DRIFT, LASER_1, LASER_2, SIGNALS, U1
 from bench.app.cli.main import main
 from bench.config.model import BenchConfiguration
@@ -139,6 +139,18 @@ def test_a_check_that_fails_leaves_the_campaign_without_it(
     assert point.status == "measured"
     warned = [step.event.text for step in steps if isinstance(step, Publish) and isinstance(step.event, Warned)]
     assert any("the lasers are not checked" in text and "3 cycles" in text for text in warned)
+
+
+def test_calibrated_lasers_have_the_zero_from_momentum_without_a_check(
+    stored: Callable[..., BenchConfiguration],
+) -> None:
+    calibrated = stored().model_copy(update={"calibrated": calibration(-0.1, 0.1)})
+    _, (point,) = played_through(calibrated, ONE, lambda *_: None)
+    assert point.alpha_2 is not None
+    assert point.drift_peak_m is not None
+    # the zeros at rest of two lasers, each within one step
+    at_rest = point.alpha_2 * calibrated.analysis.laser_resolution / np.sqrt(6.0) / point.drift_peak_m
+    assert json.loads(point.uncertainty_parts)[STEPS] < 0.3 * at_rest
 
 
 QUICK = ("--tolerance", "0.05", "--spectrum-tolerance", "0.1", "--decay", "1", "--length-ratio", "0.25")
