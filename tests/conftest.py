@@ -66,7 +66,7 @@ SPREAD = "tests/faults/test_matrix.py"
 
 SLOW = (
     "tests/test_notebooks.py",
-    "tests/sim/",
+    "tests/sim/test_kernel_cache.py",
     "tests/pages/",
     "tests/first_edition/",
     "tests/faults/test_killed.py",
@@ -75,9 +75,7 @@ SLOW = (
     "tests/bench/replay/",
     "tests/protocols/",
 )
-"""Files of which many take ten seconds and more: begun early, so that none of them is alone at the end. Those of the
-kernel are carried out beside REAL_TIME, where one process loads all compiled functions, instead of each at the end.
-"""
+"""Files of which many take ten seconds and more: begun early, so that none of them is alone at the end."""
 
 
 KERNELS = (
