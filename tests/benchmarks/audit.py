@@ -17,7 +17,7 @@ import json
 import sys
 import tempfile
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from multiprocessing import get_context
 from pathlib import Path
@@ -110,7 +110,7 @@ Mapped = Callable[[Callable[[tuple[str, int]], Outcome], Sequence[tuple[str, int
 
 
 @contextmanager
-def _mapped(processes: int) -> Iterator[Mapped]:
+def _mapped(processes: int) -> Generator[Mapped]:
     """`map` in this process, or divided among so many others."""
     if processes == 1:
         yield map
@@ -127,7 +127,7 @@ HEADING = (
 
 def table(asked: Iterable[Study], results: Stored, before: Sequence[str] = ()) -> list[str]:
     """Lines of the table for the studies of which benches are stored; of the others, those of the table `before`."""
-    lines = list(HEADING)
+    lines = list[str](HEADING)
     for study in asked:
         outcomes = list(results.get(study.name, {}).values())
         measured = [one for one in outcomes if not isinstance(one, Omitted)]

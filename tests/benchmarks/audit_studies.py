@@ -59,7 +59,11 @@ HARMONIC = {
 
 
 CAMPAIGN = ("default", "calibrated")
-"""Cases whose points are also tested within a campaign, with the bare frame at all of its frequencies."""
+"""Cases whose points are also tested within a campaign, with the bare frame at all of its frequencies; of the other
+cases, this is done for `MOVED`."""
+
+MOVED = (20.0, 0.64)
+"""Point at which the bare frame moves much less than the coupled one, so that its other frequencies matter most."""
 
 
 def _harmonic(seed: int, case: str, omega: float, beta: float, *, campaign: bool = False) -> Outcome:
@@ -116,6 +120,7 @@ def studies() -> dict[str, Study]:
     alpha_2 = {"alpha_2": "α₂"}
     alone = [(case, point, False) for case, (_, points) in HARMONIC.items() for point in points]
     campaign = [(case, point, True) for case in CAMPAIGN for point in (*coverage.POINTS, *MORE_POINTS)]
+    campaign += [(case, MOVED, True) for case in HARMONIC if case not in CAMPAIGN]
     found = [
         Study(
             f"alpha_2, {case}, {'campaign, ' if together else ''}{omega:g}, {beta:g}",

@@ -72,7 +72,7 @@ class Statistics:
     @property
     def conspicuous(self) -> bool:
         """Whether honest normal intervals give such a coverage, or such an rms of e, in 5 % of the cases or fewer."""
-        low, high = chi2.ppf((0.025, 0.975), self.n)
+        low, high = (float(chi2.ppf(share, self.n)) for share in (0.025, 0.975))
         return not (self.low <= HONEST <= self.high and low <= self.n * self.rms**2 <= high)
 
 

@@ -151,7 +151,7 @@ def opening(folder: Path) -> bool:
     ours(path, 16, counts, drive, 100)
     grow(path)
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    seconds = float("inf")
+    seconds = part = float("inf")
     for _ in range(3):
         start = time.perf_counter()
         with bench.datafile.open(path) as record:

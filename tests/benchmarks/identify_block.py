@@ -19,6 +19,7 @@ from collections.abc import Sequence
 from functools import cached_property, partial
 from math import sqrt
 from multiprocessing import get_context
+from typing import Any
 
 import numpy as np
 
@@ -48,7 +49,10 @@ def repeat(seed: int, *, as_drawn: bool) -> list[Estimate]:
     """What `NAMES` names, for one bench."""
     random = np.random.default_rng((2027, seed))
     factor = float(random.uniform(0.98, 1.0))
-    drawn = {"linearity_periods": random.uniform(*WAVES), "clock_error": random.uniform(-CLOCK, CLOCK)}
+    drawn: dict[str, Any] = {
+        "linearity_periods": random.uniform(*WAVES),
+        "clock_error": random.uniform(-CLOCK, CLOCK),
+    }
     laser = Laser(scale_error=float(random.uniform(-0.002, 0.002)), **(drawn if as_drawn else {}))
     asked, nominal = FreeRockingParameters(), Specimen()
     true = Specimen(block=Block(restitution_factor=factor)).coupled(0.0)

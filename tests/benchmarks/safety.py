@@ -15,7 +15,7 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -41,7 +41,7 @@ PHASES = np.linspace(0.0, 1.0, 6, endpoint=False)
 
 
 @contextmanager
-def _simulated() -> Iterator[BenchConfiguration]:
+def _simulated() -> Generator[BenchConfiguration]:
     yield BenchConfiguration()
 
 

@@ -5,6 +5,7 @@ impacts, then many more around the lowest point of that phase.
 """
 
 from math import pi
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,7 +67,7 @@ def _resting(
 def _phase(case: Case, segments: NDArray[np.float64], motion: Motion, choice: float) -> list[str]:
     """Whether theta keeps its sign between two impacts, looked at closely."""
     duration = float(segments[:, 0].sum())
-    options = {
+    options: dict[str, Any] = {
         "order": series_order(TOLERANCE, float(np.median(segments[:, 0]))),
         "tolerance": TOLERANCE,
         "rest_angle": REST_ANGLE,

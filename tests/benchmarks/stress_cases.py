@@ -228,7 +228,9 @@ def anything(rng: Generator) -> Case:
     specimen = Specimen(frame=frame, block=shape, beta=spread(rng, 1e-3, 100.0), d=spread(rng, 0.02, 1.0))
     u, v = rng.normal(size=2) * 0.2 * specimen.d, rng.normal(size=2) * spread(rng, 1e-6, 1.0)
     theta = crest(shape) * float(rng.uniform(-0.9, 0.9))
-    state = State(float(np.clip(u[0], -0.9 * specimen.d, 0.9 * specimen.d)), float(u[1]), *v.tolist(), theta)
+    state = State(
+        float(np.clip(u[0], -0.9 * specimen.d, 0.9 * specimen.d)), float(u[1]), float(v[0]), float(v[1]), theta
+    )
     return Case(specimen, drive(rng, specimen), state)
 
 
