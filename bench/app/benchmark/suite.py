@@ -124,7 +124,7 @@ class Scale:
     members : number of specimens in the scatter case.
     stream : duration of the streamed motion [s].
     repetitions : number of runs at each size in the growth measurements.
-    warm : number of starts with a filled compiler cache.
+    cold, warm : numbers of starts with an empty and with a filled compiler cache.
     """
 
     name: str
@@ -136,11 +136,12 @@ class Scale:
     members: int
     stream: float
     repetitions: int
+    cold: int
     warm: int
 
 
-QUICK = Scale("quick", False, 0.25, 20, 6, 1, 100, 2.0, 4, 1)
-FULL = Scale("full", True, 5.0, 100, 50, 3, 1000, 20.0, 20, 5)
+QUICK = Scale("quick", False, 0.25, 20, 6, 1, 100, 2.0, 4, 1, 1)
+FULL = Scale("full", True, 5.0, 100, 50, 3, 1000, 20.0, 20, 3, 5)
 
 
 def _work_precision(scale: Scale) -> Section:
@@ -182,7 +183,7 @@ def _scaling(scale: Scale) -> Section:
 def _startup(scale: Scale) -> Section:
     from bench.app.benchmark.scaling import startup
 
-    return startup(scale.warm)
+    return startup(scale.cold, scale.warm)
 
 
 def _members(scale: Scale) -> Section:

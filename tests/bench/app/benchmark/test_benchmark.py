@@ -11,7 +11,7 @@ from bench.app.cli.main import main
 from bench.comparators import case
 from sim.errors import InvalidInput
 
-TINY = suite.Scale("tiny", False, 0.02, 4, 2, 1, 4, 0.5, 1, 1)
+TINY = suite.Scale("tiny", False, 0.02, 4, 2, 1, 4, 0.5, 1, 1, 1)
 COMPILED = [method for method in methods(quick=True) if method.weight < 0.02 and not method.module]
 
 
