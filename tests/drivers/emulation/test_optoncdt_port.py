@@ -110,7 +110,8 @@ def test_an_answer_may_be_made_to_split_a_value(make: Make, connect: Open) -> No
         received += receive(port, lambda part: b"ECHO ON\r\n->" in part)
     received += receive(port, enough(1200))
     _, rest = decode(received)
-    assert len(rest) - 20 * len(b"ECHO ON\r\n->") > 15
+    # three bytes of each value that was split: on a busy machine not of every answer, without splitting none
+    assert len(rest) - 20 * len(b"ECHO ON\r\n->") >= 6
 
 
 def test_the_clock_is_the_sensors_own(make: Make, connect: Open) -> None:
