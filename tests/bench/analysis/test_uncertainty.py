@@ -47,6 +47,16 @@ def test_what_agrees_is_weighted_by_its_uncertainty_and_has_no_scatter() -> None
     assert found.birge[0] == pytest.approx(np.sqrt(0.25 / 5.0))
 
 
+@pytest.mark.parametrize(("repeats", "birge", "consistent"), [(4, 1.1, False), (5, 1.1, True), (5, 1.3, False)])
+def test_five_repeats_and_more_are_tested_for_consistency(repeats: int, birge: float, consistent: bool) -> None:
+    # chi2 of 1.1^2 and 1.3^2 times 4 degrees of freedom have probabilities of 30 and 15 %, by its table
+    values = np.linspace(-1.0, 1.0, repeats)[:, None]
+    values *= birge / np.std(values, ddof=1)
+    found = mean_of_repeats(values, np.ones_like(values))
+    assert found.birge[0] == pytest.approx(birge)
+    assert bool(found.scatter[0] == 0.0) is consistent
+
+
 def test_a_single_one_is_kept() -> None:
     found = mean_of_repeats([[3.0, 4.0]], [[1.0, 2.0]])
     np.testing.assert_array_equal(found.values, [3.0, 4.0])
