@@ -84,6 +84,11 @@ class SensorUncertainty:
         """Relative standard uncertainty of the scales of the table's sensors."""
         return self.accuracy.table_scale if self.calibration is None else self.calibration.table_uncertainty
 
+    @property
+    def shapes_known(self) -> bool:
+        """Whether the shapes of the lasers' linearity errors were calibrated or checked."""
+        return self.calibration is not None or bool(self.checks)
+
     def linearity_amplitude(self, laser: int, displacements: Array) -> float:
         """Amplitude [m] of the linearity error of laser 0 or 1 at `displacements` from rest [m], NaN where missing.
 

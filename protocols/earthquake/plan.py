@@ -276,9 +276,7 @@ class EarthquakePlan:
         """Evaluate the signals of a record. The zero from momentum has the errors of the lasers at all places of the
         motion: it is evaluated if these errors were calibrated or their shapes checked.
         """
-        sensors = self._correction.sensors
-        known = bool(sensors.checks) or sensors.calibration is not None
-        frame = linear_frame(self._configuration) if known else None
+        frame = linear_frame(self._configuration) if self._correction.sensors.shapes_known else None
         return observe(signals, shaking.target.rest, shaking.target.sample_rate, frame)
 
     def _play(

@@ -205,8 +205,7 @@ def drift_errors(
     """
     random = np.random.default_rng(seed)
     noise = np.array([_noise(peak, random, n) for peak in peaks])
-    known = bool(sensors.checks) or sensors.calibration is not None
-    others = [(test, other) for test, peak in enumerate(peaks) for other in peak.others] if known else []
+    others = [(test, other) for test, peak in enumerate(peaks) for other in peak.others] if sensors.shapes_known else []
     seen = [*peaks, *(other for _, other in others)]
     drifts = np.array([[each.peak.value] for each in seen])
     errors = sensors.drift_errors([_sighting(each) for each in seen], Draws(random, n))

@@ -115,14 +115,10 @@ STARTUP_COLUMNS = (
 
 def startup(cold_runs: int, warm_runs: int) -> Section:
     """Time cold starts, each with an empty compiler cache, then warm starts with a filled cache."""
-    colds = list[tuple[float, float | None]]()
-    for _ in range(cold_runs - 1):
-        with temporary_folder() as cache:
-            colds.append(_run(cache))
-    with temporary_folder() as cache:
-        colds.append(_run(cache))
-        starts = sorted((_run(cache) for _ in range(warm_runs)), key=lambda start: start[0])
-    colds.sort(key=lambda start: start[0])
+    with temporary_folder() as folder:
+        caches = [folder / str(number) for number in range(cold_runs)]
+        colds = sorted((_run(cache) for cache in caches), key=lambda start: start[0])
+        starts = sorted((_run(caches[0]) for _ in range(warm_runs)), key=lambda start: start[0])
     (cold, cold_work), (warm, warm_work) = (each[len(each) // 2] for each in (colds, starts))
     # other load makes a start longer, never shorter
     shortest = colds[0][0] - starts[0][0]

@@ -154,7 +154,7 @@ def test_stated_uncertainties_are_those_of_repetition() -> None:
         started = signal.sosfilt_zi(card) * seen.displacement[0]
         filtered, _ = signal.sosfilt(card, seen.displacement, zi=started)
         found = analyse_tilt(replace(seen, displacement=np.asarray(filtered)), SPECIMEN, LEAST)
-        values, spread = found.fit.values, np.sqrt(found.fit.variances(found.fit.residual[:, None])[:, 0])
+        values, (spread, _) = found.fit.values, LaserErrors(PERFECT, 0.2).noise_and_timing(found.fit)
         relation = found.relation
         errors.append([values[R] - true.restitution, values[P] - P_TRUE, relation.restitution - true.restitution])
         stated.append([spread[R], spread[P], relation.uncertainty])

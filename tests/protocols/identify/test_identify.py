@@ -1,7 +1,6 @@
 """The identification end to end, on virtual benches whose equations are known, and what its files say."""
 
 import json
-from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from itertools import pairwise
 from pathlib import Path
@@ -12,15 +11,14 @@ import pytest
 from bench.analysis.signals import DISPLACEMENT
 from bench.app.catalogue import load_protocol
 from bench.app.preflight import compile_run
-from bench.app.session import SessionResult, run_session
+from bench.app.session import SessionResult
 from bench.config.model import BenchConfiguration
 from bench.config.review import review
 from bench.config.sections import Acquisition, Simulation
 from bench.control.table_model import TableModel
 from bench.datafile.reader import open_datafile
-from bench.engine.interface import Requests, Unattended
 from bench.engine.steps import Done, Outcome, Play, Played, Publish, Step
-from bench.events import Acquired, Event, PointFinished, StepStarted, Warned
+from bench.events import Event, PointFinished, StepStarted, Warned
 from bench.findings import TableIdentified
 from bench.guard.limits import Limits, Ramps
 from bench.preflight.demands import response_of
@@ -38,7 +36,7 @@ from sim.shaker import Shaker
 from sim.specimen import Frame, Specimen
 from sim.virtual_bench import VirtualBenchParameters
 from tests.bench.control.virtual_table import closed_form
-from tests.protocols.progress import ends_at_100_percent
+from tests.protocols.progress import ends_at_100_percent, followed
 
 DAMPED = Specimen(frame=Frame(xi1=0.2, xi2=0.2))
 PROTOCOL = load_protocol("identify")
@@ -54,17 +52,7 @@ def bench(shaker: Shaker | None = None, specimen: Specimen = DAMPED, **changes: 
 def run(
     parameters: IdentifyParameters, configuration: BenchConfiguration, out: Path, *, figures: bool = False
 ) -> tuple[SessionResult, list[Event]]:
-    events: list[Event] = []
-    result = run_session(
-        PROTOCOL if figures else replace(PROTOCOL, figures=()),
-        PROTOCOL.prepare(parameters, configuration, None),
-        out=out,
-        operator=Unattended(),
-        subscribers=[lambda event: None if isinstance(event, Acquired) else events.append(event)],
-        requests=Requests(),
-        realtime=False,
-    )
-    return result, events
+    return followed(PROTOCOL, PROTOCOL.prepare(parameters, configuration, None), out, figures=figures)
 
 
 @pytest.fixture(scope="module")
