@@ -68,7 +68,8 @@ def remove_unused(folder: Path) -> None:
 def check_folder(folder: Path, results: Iterable[str]) -> None:
     """Check that the `results` of a run can be written to a folder, without creating it.
 
-    Raises InvalidInput naming the reason if they cannot be written.
+    A default folder is checked without `results`: if a run that began in the same second has it, `make_folder` creates
+    another one. Raises InvalidInput naming the reason if they cannot be written.
     """
     existing = folder
     try:

@@ -80,7 +80,7 @@ def run(
             progress(text, done / total if total else 0.0)
 
     with python_names():
-        check_folder(folder, result_names(chosen))
+        check_folder(folder, () if out is None else result_names(chosen))
         folder = make_folder(folder) if out is None else folder
         try:
             with interruptible(requests, asking=lambda: person.asking) as interrupts:

@@ -97,7 +97,7 @@ def _run(
     configuration = configuration_from(options.config, options.seed, options.specimen)
     configuration = with_profile(configuration, options.profile)
     out = options.out or default_folder(protocol.name, datetime.now())
-    check_folder(out, result_names(protocol))
+    check_folder(out, () if options.out is None else result_names(protocol))
     if options.queue is not None:
         _check_for_queue(options)
         return _add_to_queue(options.queue, protocol, parameters, configuration, options, progress)

@@ -246,7 +246,7 @@ class ProtocolPage(QWidget):
         """Plan check with the values of the form. Raises InvalidInput for an invalid value or an unusable folder."""
         entry, parameters = self.entry, self.form.parameters()
         out = self.options.out or Path(self.folder.placeholderText())
-        check_folder(out, result_names(entry))
+        check_folder(out, () if self.options.out is None else result_names(entry))
         return PlanCheck(entry.name, parameters, self._configuration, out)
 
     def _choose(self, index: int) -> None:

@@ -7,9 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from bench.app import run as script
 from bench.app.folders import make_folder, remove_unused
 from sim.errors import InvalidInput
-from tests.command_line import main_with
+from tests.command_line import FakeSession, main_with
 
 SAME_SECOND = """
 import json, os, sys
@@ -45,24 +46,29 @@ for folder, *arguments in json.loads(sys.argv[2]):
 """Runs with a clock that stands still and without their bench: what is left is the command and the folder. The
 protocol is one that computes nothing before it begins."""
 
+SAME = "laser-calibration-2026-01-02T03-04-05"
+
 Together = dict[Path, list[tuple[int, str]]]
 """The code and standard error of each of two runs that were let go in a folder at the same moment."""
 
 
 @pytest.fixture(scope="module")
 def together(tmp_path_factory: pytest.TempPathFactory) -> Together:
-    """Two processes, which run at the same moment in a folder, then in one with an older result in `mine`."""
-    free, taken = tmp_path_factory.mktemp("free"), tmp_path_factory.mktemp("taken")
+    """Two processes, which run at the same moment in a folder, then in one with an older result in `mine`, and in one
+    in which a run of the same second has begun already."""
+    free, taken, begun = (tmp_path_factory.mktemp(name) for name in ("free", "taken", "begun"))
     (taken / "mine").mkdir()
     (taken / "mine" / "campaign.h5").write_text("older")
-    rounds = json.dumps([[str(free)], [str(taken), "--out", "mine"]])
+    (begun / "runs" / SAME).mkdir(parents=True)
+    (begun / "runs" / SAME / "campaign.h5").write_text("earlier")
+    rounds = json.dumps([[str(free)], [str(taken), "--out", "mine"], [str(begun)]])
     running = [
         subprocess.Popen(
             [sys.executable, "-c", SAME_SECOND, name, rounds], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
         )
         for name in ("first", "second")
     ]
-    found: Together = {free: [], taken: []}
+    found: Together = {free: [], taken: [], begun: []}
     for ended in found.values():
         for process in running:
             assert process.stdout is not None
@@ -84,9 +90,8 @@ def together(tmp_path_factory: pytest.TempPathFactory) -> Together:
 def test_two_runs_in_the_same_second_have_a_folder_each(together: Together) -> None:
     folder, ended = next(iter(together.items()))
     assert [code for code, _ in ended] == [0, 0]
-    name = "laser-calibration-2026-01-02T03-04-05"
     folders = sorted(path.name for path in (folder / "runs").iterdir())
-    assert folders == [name, f"{name}-2"]
+    assert folders == [SAME, f"{SAME}-2"]
     assert {(folder / "runs" / each / "campaign.h5").read_text() for each in folders} == {"first", "second"}
 
 
@@ -97,6 +102,32 @@ def test_a_folder_that_was_named_is_never_exchanged_for_another(together: Togeth
         assert "it already contains campaign.h5" in errors
     assert sorted(path.name for path in folder.iterdir()) == ["mine"]
     assert (folder / "mine" / "campaign.h5").read_text() == "older"
+
+
+def test_a_run_of_the_same_second_that_wrote_already_keeps_its_folder(together: Together) -> None:
+    folder, ended = [*together.items()][2]
+    assert [code for code, _ in ended] == [0, 0]
+    texts = {path.name: (path / "campaign.h5").read_text() for path in (folder / "runs").iterdir()}
+    assert texts.pop(SAME) == "earlier"
+    assert sorted(texts) == [f"{SAME}-2", f"{SAME}-3"]
+    assert {*texts.values()} == {"first", "second"}
+
+
+def test_a_run_of_a_script_in_the_same_second_has_its_own_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    session = FakeSession()
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(script, "run_session", session)
+    monkeypatch.setattr(script, "default_folder", _same_folder)
+    Path("runs", SAME).mkdir(parents=True)
+    Path("runs", SAME, "campaign.h5").touch()
+    monkeypatch.setattr(script, "Campaign", Path)
+    assert script.run("laser-calibration") == session.calls[0]["out"] == Path("runs", f"{SAME}-2")
+
+
+def _same_folder(*_: object) -> Path:
+    return Path("runs", SAME)
 
 
 def test_many_processes_that_ask_at_once_get_different_folders(tmp_path: Path) -> None:

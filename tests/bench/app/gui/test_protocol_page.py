@@ -175,6 +175,8 @@ def test_a_folder_that_another_program_made_meanwhile_is_left_to_it(
     spoken.latest.said.append(FINE)
     window._controller._look()
     shown.mkdir(parents=True)
+    for name in left:
+        (shown / name).touch()
     page.begin()
     run = spoken.latest.assignment
     assert isinstance(run, Run)
