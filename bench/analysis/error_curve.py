@@ -10,6 +10,10 @@ the Chebyshev coefficients of the curve over the swing. For each number of waves
 harmonics is that of Gaussian process regression (Rasmussen and Williams, 2006, section 2.2); each is weighted by a
 power `CAUTION` of its evidence (section 5.2). The amplitude is not estimated, since a small swing does not determine
 amplitude and number of waves separately.
+
+A calibration measures the curve over a part of the range. Its Chebyshev coefficients are equivalent to the harmonics of
+a sine over this part, with the fundamental, which contains the unknown scale of the laser: the posterior extrapolates
+the curve beyond the calibrated readings.
 """
 
 from collections.abc import Sequence
@@ -37,6 +41,9 @@ CAUTION = 0.3
 and because the harmonics of a small swing hardly determine the number of waves.
 """
 
+SCALE = 0.01
+"""Standard deviation of the unknown relative error of a laser's scale: more than any, so that it is measured."""
+
 LEAST = 1e-5
 """Smallest uncertainty of a harmonic, relative to the limit of the data sheet, so that exact harmonics can be
 evaluated.
@@ -48,13 +55,15 @@ class Harmonics:
     """Harmonics of the reading of one laser in a test of a linear frame.
 
     `readings`, shape (n,) [m], over one period at equal steps of the phase, relative to the rest position; `found`,
-    shape (m,), complex [m], are the amplitudes c_k, from order 2 on, in signal = Re(sum of c_k exp(-i k phase));
-    `uncertainty`, shape (m,) [m], is the standard uncertainty of their real and imaginary parts.
+    shape (m,), complex [m], are the amplitudes c_k, from the order `first` on, in signal = Re(sum of c_k exp(-i k
+    phase)); `uncertainty`, shape (m,) [m], is the standard uncertainty of their real and imaginary parts. `first` is 2
+    unless the motion is known, so that the fundamental tells the error of the scale.
     """
 
     readings: Array
     found: NDArray[np.complex128]
     uncertainty: Array
+    first: int = 2
     _enlarged: "dict[float, Harmonics]" = field(default_factory=lambda: _none(), init=False, repr=False)
 
     @property
@@ -109,7 +118,8 @@ class Posterior:
     """Information from m measured harmonics about the error curve, for each of K candidates with different numbers of
     waves. `whitening`, shape (K, m, m), transforms the harmonics to independent numbers of unit variance; `measured`,
     shape (K, m), are the transformed harmonics; `likely`, shape (K,), is the weight of each candidate. `observed`,
-    shape (m, n), computes the harmonics of a curve from its values at the `places`, shape (n,).
+    shape (m, n), computes the harmonics of a curve from its values at the `places`, shape (n,). `scale` is the prior
+    standard deviation of the laser's relative error of scale if they tell it, otherwise zero.
     """
 
     places: Array
@@ -117,21 +127,31 @@ class Posterior:
     whitening: Array
     measured: Array
     likely: Array
+    scale: float
 
 
 @lru_cache(maxsize=4)
 def posterior(checks: tuple[Harmonics, ...], limit: float, whole: float) -> Posterior:
     places = np.concatenate([each.readings for each in checks])
-    observed = block_diagonal([_fourier(each.readings.size, each.found.size) for each in checks])
+    observed = block_diagonal([_fourier(each.readings.size, each.found.size, each.first) for each in checks])
     measured = np.concatenate([np.concatenate((each.found.real, each.found.imag)) for each in checks])
     noise = np.diag(np.concatenate([np.tile(each.uncertainty, 2) for each in checks]) ** 2 + (LEAST * limit) ** 2)
-    factors = np.linalg.cholesky(0.5 * limit**2 * covariances(places, observed, places, observed, whole) + noise)
+    scale = SCALE if any(each.first == 1 for each in checks) else 0.0
+    factors = np.linalg.cholesky(prior(places, observed, places, observed, limit, whole, scale) + noise)
     whitening = np.asarray(np.linalg.inv(factors), dtype=np.float64)
     white = whitening @ measured
     sizes = np.log(np.diagonal(factors, axis1=1, axis2=2)).sum(axis=1)
     evidence = -0.5 * np.einsum("km,km->k", white, white) - sizes
     likely = np.exp(CAUTION * (evidence - evidence.max()))
-    return Posterior(places, observed, whitening, white, likely / likely.sum())
+    return Posterior(places, observed, whitening, white, likely / likely.sum(), scale)
+
+
+def prior(one: Array, left: Array, other: Array, right: Array, limit: float, whole: float, scale: float = 0.0) -> Array:
+    """Covariances [m2] of linear functions of the error curve of a laser with the measuring range `whole` [m], the
+    largest error `limit` [m], and the standard deviation `scale` of the relative error of its scale; see `covariances`.
+    """
+    found = 0.5 * limit**2 * covariances(one, left, other, right, whole)
+    return found if scale == 0.0 else found + scale**2 * np.outer(left @ one, right @ other)
 
 
 def covariances(one: Array, left: Array, other: Array, right: Array, whole: float) -> Array:
@@ -167,9 +187,9 @@ def block_diagonal(blocks: Sequence[Array]) -> Array:
 
 
 @lru_cache(maxsize=8)
-def _fourier(points: int, orders: int) -> Array:
+def _fourier(points: int, orders: int, first: int) -> Array:
     """Matrix, shape (2 * orders, points), from `points` values over one period to their cosine and sine coefficients,
-    from order 2 on.
+    from the order `first` on.
     """
-    angles = np.outer(np.arange(2, 2 + orders), np.arange(points) * (2.0 * pi / points))
+    angles = np.outer(np.arange(first, first + orders), np.arange(points) * (2.0 * pi / points))
     return np.concatenate((np.cos(angles), np.sin(angles))) * (2.0 / points)

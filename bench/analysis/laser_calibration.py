@@ -6,16 +6,22 @@ table's sensors have one factor each: true = factor times reading.
 
 from collections.abc import Mapping
 from datetime import datetime, timedelta
+from functools import cached_property
+from math import sqrt, tau
 
 import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 from pydantic import AwareDatetime, model_validator
 
+from bench.analysis.error_curve import Harmonics
 from sim.errors import InvalidInput
 from sim.parameters import Parameters, quantity
 
 Array = NDArray[np.float64]
+
+ORDERS, PLACES = 20, 96
+"""Number of orders that a calibration determines, and of readings at which it tells the error curve."""
 
 
 class LaserCurve(Parameters):
@@ -54,6 +60,19 @@ class LaserCurve(Parameters):
         """Readings [m] corrected for the laser's error, same shape; NaN remains NaN."""
         place = (2.0 * readings - self.highest - self.lowest) / (self.highest - self.lowest)
         return readings - chebyshev.chebval(np.clip(place, -1.0, 1.0), np.array(self.error))
+
+    @cached_property
+    def harmonics(self) -> Harmonics:
+        """Harmonics that the readings of this laser would have during a sine over the covered readings: the Chebyshev
+        coefficients of its error, of which those that were not fitted are zero.
+        """
+        middle, half = 0.5 * (self.lowest + self.highest) - self.rest, 0.5 * (self.highest - self.lowest)
+        found = np.zeros(max(ORDERS, len(self.error) - 1), dtype=np.complex128)
+        found[: len(self.error) - 1] = self.error[1:]
+        # the mean square of a sum of cosines is half the sum of their squares
+        uncertainty = np.full(found.size, self.uncertainty * sqrt(2.0 / found.size))
+        phases = np.arange(PLACES) * (tau / PLACES)
+        return Harmonics(middle + half * np.cos(phases), found, uncertainty, first=1)
 
 
 class LaserCalibration(Parameters):

@@ -16,7 +16,7 @@ from math import exp, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.analysis.error_curve import WAVES, Harmonics, block_diagonal, covariances, posterior
+from bench.analysis.error_curve import WAVES, Harmonics, block_diagonal, posterior, prior
 from sim.linear import steady_response
 from sim.specimen import Specimen
 
@@ -107,17 +107,18 @@ def linearity_errors(
     places = np.concatenate([each.places for each in effects])
     weights = block_diagonal([each.weights[None, :] for each in effects])
     waves = np.tile(WAVES, 2)
-    prior = 0.5 * limit**2 * covariances(places, weights, places, weights, whole)
     if not checks:
-        worst = int(np.einsum("i,kij,j->k", shares, prior, shares).argmax())
-        return LinearityErrors(prior[worst], float(waves[worst]))
+        alone = prior(places, weights, places, weights, limit, whole)
+        worst = int(np.einsum("i,kij,j->k", shares, alone, shares).argmax())
+        return LinearityErrors(alone[worst], float(waves[worst]))
     learned = posterior(tuple(checks), limit, whole)
-    crossed = 0.5 * limit**2 * covariances(learned.places, learned.observed, places, weights, whole)
+    alone = prior(places, weights, places, weights, limit, whole, learned.scale)
+    crossed = prior(learned.places, learned.observed, places, weights, limit, whole, learned.scale)
     white = learned.whitening @ crossed
     mean = np.einsum("kmi,km->ki", white, learned.measured)
     if corrected:
         mean = mean - learned.likely @ mean
-    moments = prior - white.transpose(0, 2, 1) @ white + mean[:, :, None] * mean[:, None, :]
+    moments = alone - white.transpose(0, 2, 1) @ white + mean[:, :, None] * mean[:, None, :]
     found = exp(float(learned.likely @ np.log(waves)))
     return LinearityErrors(np.einsum("k,kij->ij", learned.likely, moments), found)
 
@@ -130,7 +131,7 @@ def expected_errors(places: Array, limit: float, whole: float, checks: Sequence[
         return np.zeros(places.size)
     learned = posterior(tuple(checks), limit, whole)
     read = np.append(places, 0.0)
-    crossed = 0.5 * limit**2 * covariances(learned.places, learned.observed, read, np.eye(read.size), whole)
+    crossed = prior(learned.places, learned.observed, read, np.eye(read.size), limit, whole, learned.scale)
     means = np.einsum("kmi,km->ki", learned.whitening @ crossed, learned.measured)
     expected = learned.likely @ means
     return expected[:-1] - expected[-1]

@@ -4,6 +4,9 @@ The harmonics of the bare frame tell the curvature of a laser's error curve over
 error (`bench.analysis.linearity.expected_errors`) tends to a constant far outside the swing, minus the expected error
 at rest; the rest of the error is part of the uncertainty of `SensorUncertainty.corrected_by` the same checks. A change
 of scale causes no harmonics: it is neither found nor corrected.
+
+The readings of calibrated lasers have been corrected by their curves, which hold the error constant beyond the
+calibrated readings. There it is continued by the expected error relative to that at the nearer end.
 """
 
 from collections.abc import Sequence
@@ -27,9 +30,7 @@ for the shortest of the assumed waves.
 
 @dataclass(frozen=True)
 class ReadingCorrection:
-    """Correction according to the checks of `sensors`; none without checks, or with a calibration, which has corrected
-    the readings before.
-    """
+    """Correction according to the checks of `sensors` or, beyond the calibrated readings, to their calibration."""
 
     sensors: SensorUncertainty
 
@@ -56,9 +57,16 @@ class ReadingCorrection:
     @cached_property
     def _curves(self) -> Sequence[tuple[Array, Array]]:
         """Readings and expected errors [m] of each laser."""
-        found = list[tuple[Array, Array]]()
-        for laser, whole in enumerate(self.sensors.ranges):
-            places = np.linspace(-whole, whole, PLACES)
-            limit = self.sensors.accuracy.laser_linearity * whole
-            found.append((places, expected_errors(places, limit, whole, self.sensors.checks_of(laser))))
-        return found
+        return [self._curve(laser) for laser in (0, 1)]
+
+    def _curve(self, laser: int) -> tuple[Array, Array]:
+        whole, calibration = self.sensors.ranges[laser], self.sensors.calibration
+        limit, places = self.sensors.accuracy.laser_linearity * whole, np.linspace(-whole, whole, PLACES)
+        if calibration is None:
+            return places, expected_errors(places, limit, whole, self.sensors.checks_of(laser))
+        curve = calibration.lasers[laser]
+        low, high = curve.lowest - curve.rest, curve.highest - curve.rest
+        places = np.concatenate((places[places < low], [low, high], places[places > high]))
+        errors = expected_errors(places, limit, whole, [curve.harmonics])
+        # the calibration has corrected the covered readings, and the others for the error at the nearer end
+        return places, errors - np.where(places <= low, *np.interp([low, high], places, errors))

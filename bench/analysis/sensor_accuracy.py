@@ -4,8 +4,8 @@ Two tests use the same sensors, so every draw has the same pair of lasers for bo
 errors cancel in the ratio of their drifts to the extent that they are equal.
 
 The shape of a laser's linearity error is unknown (`bench.analysis.linearity`); the test of the bare frame checks it.
-For a calibrated laser, the uncertainty of the calibration applies to the covered readings, and the data sheet beyond
-them.
+For a calibrated laser, the uncertainty of the calibration applies to the covered readings. Beyond them, corrected
+readings have the uncertainty of the continued curve, and others that of the data sheet.
 """
 
 from collections.abc import Sequence
@@ -69,8 +69,8 @@ class SensorUncertainty:
     """Uncertainty of the sensors from data sheets or a calibration.
 
     `ranges` are the lasers' measuring ranges [m]; `checks` are the harmonics of their readings in tests of the bare
-    frame; `corrected` states whether the readings are corrected for the errors that the checks lead to expect
-    (`bench.analysis.reading_correction`).
+    frame; `corrected` states whether the readings are corrected for the errors that the checks, or the calibration
+    beyond its readings, lead to expect (`bench.analysis.reading_correction`).
     """
 
     accuracy: SensorAccuracy
@@ -110,12 +110,12 @@ class SensorUncertainty:
         return self if self.checks or checks is None else replace(self, checks=(checks,))
 
     def corrected_by(self, checks: Checks | None) -> "SensorUncertainty":
-        """A copy with `checks` for corrected readings; calibrated lasers are checked only. The same object if `checks`
-        is None.
+        """A copy for corrected readings, with `checks` from one test of the bare frame or none. The same object if
+        there is neither a check nor a calibration.
         """
-        if checks is None:
+        if checks is None and self.calibration is None:
             return self
-        return replace(self, checks=(checks,), corrected=self.calibration is None)
+        return replace(self, checks=() if checks is None else (checks,), corrected=True)
 
     def checks_of(self, laser: int) -> list[Harmonics]:
         """The checks of laser 0 or 1 that are evaluated, with the uncertainty due to its resolution."""
@@ -197,7 +197,8 @@ class SensorUncertainty:
         outside = [beyond(each, low, high) for each in effects]
         if not any(each.weights.size for each in outside):
             return None
-        return linearity_errors(outside, shares_of(seen), limit, whole)
+        checks = [found.harmonics] if self.corrected else []
+        return linearity_errors(outside, shares_of(seen), limit, whole, checks, self.corrected)
 
     def rough(self, shapes: Shapes) -> tuple[str, ...]:
         """Remark on each laser whose linearity error, according to the tests of the bare frame, is not smooth."""

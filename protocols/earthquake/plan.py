@@ -130,7 +130,7 @@ class EarthquakePlan:
         self._targets, self._left_out = targets, left_out
         self._pace = Pace(parameters, shakings, table.duration, left_out, check)
         self._check = check
-        self._correction = ReadingCorrection(configuration.sensors)
+        self._correction = ReadingCorrection(configuration.sensors.corrected_by(None))
         self._bare: dict[str, BareTest | str] = {}
         self._shortfalls: dict[str, str] = {}
         self._points = 0

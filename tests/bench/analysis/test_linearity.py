@@ -1,11 +1,14 @@
 """Linearity errors of unknown shape, against curves drawn by hand."""
 
+from collections.abc import Callable
 from math import tau
 
 import numpy as np
 import pytest
+from numpy.polynomial import chebyshev
 
 from bench.analysis.error_curve import Harmonics
+from bench.analysis.laser_calibration import LaserCurve
 from bench.analysis.linearity import SMOOTH, Effect, expected_errors, linearity_errors
 
 LIMIT, WHOLE = 0.00016, 0.2
@@ -84,6 +87,59 @@ def test_of_a_curve_found_by_its_harmonics_only_a_straight_line_is_unknown() -> 
         off = curve(3.0, phase, x) - found[:-1]
         off -= straight @ np.linalg.lstsq(straight, off, rcond=None)[0]
         assert np.std(off) < 0.03 * LIMIT
+
+
+SPAN, REST = 0.08, 0.004
+"""Half of the calibrated readings, and the reading at rest [m]; the readings of the laser are to WHOLE / 2."""
+
+
+def calibrated(error: Callable[[np.ndarray], np.ndarray], noise: float, random: np.random.Generator) -> LaserCurve:
+    """What a calibration with this standard uncertainty finds of an error curve of the reading."""
+    nodes = SPAN * chebyshev.chebpts1(200)
+    found = chebyshev.chebfit(nodes / SPAN, error(nodes), 20)
+    found = found + noise * (2.0 / 20) ** 0.5 * random.standard_normal(21)
+    return LaserCurve(
+        sensor="drawn",
+        lowest=-SPAN,
+        highest=SPAN,
+        rest=REST,
+        error=tuple(found),
+        uncertainty=noise,
+        scale=1.0,
+        delay=0.0,
+        delay_uncertainty=0.0,
+    )
+
+
+@pytest.mark.parametrize(("waves", "left"), [(0.6, 0.01), (1.2, 0.02), (2.4, 0.1), (4.8, 0.4)])
+def test_a_calibrated_curve_is_extrapolated_with_an_honest_uncertainty(waves: float, left: float) -> None:
+    """A scale error of 0.4 % is part of the curve; 8 mm beyond the calibrated readings, waves of 42 mm and more."""
+    random, off, sizes = np.random.default_rng(4), [], []
+    for phase in np.arange(24) * (tau / 24):
+
+        def error(x: np.ndarray, phase: float = float(phase)) -> np.ndarray:
+            return curve(waves, phase, x) + 0.004 * x
+
+        checks = [calibrated(error, NOISE, random).harmonics]
+        for end, place in ((-SPAN, -SPAN - 0.008), (SPAN, SPAN + 0.008)):
+            places = np.array([place, end])
+            expected = np.diff(expected_errors(places - REST, LIMIT, WHOLE, checks))[0]
+            effect = Effect(places - REST, np.array([-1.0, 1.0]))
+            moments = linearity_errors([effect], np.ones(1), LIMIT, WHOLE, checks, corrected=True).moments
+            off.append(np.diff(error(places))[0] - expected)
+            sizes.append(moments[0, 0] ** 0.5)
+    worst = linearity_errors([effect], np.ones(1), LIMIT, WHOLE).moments[0, 0] ** 0.5
+    assert np.sqrt(np.mean(np.square(sizes))) < left * worst
+    # none of these numbers of waves is one that is compared
+    assert 0.4 < np.sqrt(np.mean(np.square(off) / np.square(sizes))) < 1.3
+    assert np.mean(np.abs(off) <= 2.0 * np.array(sizes)) >= 0.85
+
+
+def test_an_exactly_known_straight_error_is_continued() -> None:
+    known = calibrated(lambda x: 0.003 * x + 1e-4, 0.0, np.random.default_rng(1)).harmonics
+    places = np.array([-0.098, -SPAN, 0.0, SPAN, 0.098])
+    found = expected_errors(places - REST, LIMIT, WHOLE, [known])
+    np.testing.assert_allclose(np.diff(found), 0.003 * np.diff(places), atol=1e-3 * LIMIT)
 
 
 def test_without_a_linearity_error_nothing_is_expected() -> None:

@@ -4,8 +4,10 @@ from dataclasses import replace
 from math import tau
 
 import numpy as np
+import pytest
+from numpy.polynomial import chebyshev
 
-from bench.analysis.error_curve import Harmonics
+from bench.analysis.error_curve import Checks, Harmonics
 from bench.analysis.reading_correction import ReadingCorrection
 from bench.analysis.sensor_accuracy import SensorAccuracy, SensorUncertainty
 from bench.analysis.signals import ACCELERATION, DISPLACEMENT, DRIFT, LASER_1, LASER_2, SIGNALS, U1
@@ -68,10 +70,34 @@ def test_a_missing_reading_stays_missing_and_the_rest_position_stays_zero() -> N
     np.testing.assert_allclose(found, signals, atol=1e-15)
 
 
-def test_nothing_is_corrected_without_a_check_or_after_a_calibration() -> None:
+def test_nothing_is_corrected_without_a_check_or_calibration() -> None:
     _, seen = motion()
     assert ReadingCorrection(SENSORS)(seen) is seen
+    assert ReadingCorrection(SENSORS.corrected_by(None))(seen) is seen
     assert ReadingCorrection(SENSORS.checked_by(checked().checks[0]))(seen) is seen
-    calibrated = replace(SENSORS, calibration=calibration(-0.1, 0.1)).corrected_by(checked().checks[0])
-    assert calibrated.checks
-    assert ReadingCorrection(calibrated)(seen) is seen
+
+
+@pytest.mark.parametrize("checks", [None, checked().checks[0]])
+def test_a_calibration_is_continued_beyond_its_readings_and_left_alone_within(checks: Checks | None) -> None:
+    span, rest, places = 0.035, 0.002, np.linspace(-1.0, 1.0, 301)
+    fitted = [
+        chebyshev.chebfit(places, error(span * places - rest, laser) + 0.002 * span * places, 20) for laser in (0, 1)
+    ]
+    found = calibration(-span, span, rest, uncertainty=1e-7)
+    curves = [curve.model_copy(update={"error": tuple(each)}) for curve, each in zip(found.lasers, fitted, strict=True)]
+    found = found.model_copy(update={"laser_1": curves[0], "laser_2": curves[1]})
+    true, _ = motion()
+    seen = true.copy()
+    for laser, column in enumerate((LASER_1, LASER_2)):
+        x = true[:, column]
+        seen[:, column] = curves[laser].corrected(x + error(x, laser) + 0.002 * x + rest) - rest
+    seen[:, U1], seen[:, DRIFT] = seen[:, LASER_1] - seen[:, DISPLACEMENT], seen[:, LASER_2] - seen[:, LASER_1]
+    corrected = ReadingCorrection(replace(SENSORS, calibration=found).corrected_by(checks))(seen)
+    np.testing.assert_array_equal(corrected[:, LASER_1], seen[:, LASER_1])
+    beyond = np.abs(true[:, LASER_2]) > span + abs(rest)
+    within = np.abs(seen[:, LASER_2]) < span - abs(rest)
+    np.testing.assert_array_equal(corrected[within], seen[within])
+    off, left = (each[beyond, LASER_2] - true[beyond, LASER_2] for each in (seen, corrected))
+    level = np.mean((seen - true)[within, LASER_2])
+    assert np.sqrt(np.mean((left - level) ** 2)) < 0.1 * np.sqrt(np.mean((off - level) ** 2))
+    np.testing.assert_allclose(corrected[:, DRIFT], corrected[:, LASER_2] - corrected[:, LASER_1], atol=1e-15)
