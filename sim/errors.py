@@ -62,6 +62,14 @@ class RockbenchError(Exception):
         """The error's code and subject."""
         return Cause(self.error_code)
 
+    def __reduce__(self) -> tuple[object, ...]:
+        """Another process receives the same message, whatever the constructor of a subclass needs."""
+        return _restored, (type(self), str(self)), self.__dict__
+
+
+def _restored(kind: type[RockbenchError], text: str) -> RockbenchError:
+    return kind.__new__(kind, text)
+
 
 class InvalidInput(RockbenchError, ValueError):
     """Error: a value is refused.

@@ -46,20 +46,33 @@ class DriftZero:
     readings: Array
 
 
+def shortest(frame: LinearFrame) -> float:
+    """Shortest duration of a strong motion that is evaluated [s]."""
+    return FEWEST * 2.0 * np.pi / frame.specimen.frame.natural_frequencies[0]
+
+
+def strong_part(signals: Array, frame: LinearFrame, sample_rate: float) -> slice | None:
+    """Samples of `signals`, shape (n, len(SIGNALS)), from the first to the last strong drift; None if they are too few
+    or too many of them are missing.
+    """
+    size = np.abs(signals[:, DRIFT])
+    known = np.isfinite(size)
+    largest = np.max(size, where=known, initial=0.0)
+    strong = np.flatnonzero(size >= STRONG * largest)
+    if largest == 0.0 or (strong[-1] - strong[0]) / sample_rate < shortest(frame):
+        return None
+    during = slice(int(strong[0]), int(strong[-1]) + 1)
+    return during if known[during].mean() >= COMPLETE else None
+
+
 def drift_zero(signals: Array, frame: LinearFrame, sample_rate: float) -> DriftZero | None:
     """Zero of the drift in `signals`, shape (n, len(SIGNALS)), of a `frame` with or without block; None if the motion
     is too short, or too many samples are missing.
     """
-    size = np.abs(signals[:, DRIFT])
-    known = np.isfinite(size)
-    strong = np.flatnonzero(size >= STRONG * np.max(size, where=known, initial=0.0)) if known.any() else np.zeros(0)
-    if not strong.size:
+    during = strong_part(signals, frame, sample_rate)
+    if during is None:
         return None
-    during = slice(int(strong[0]), int(strong[-1]) + 1)
-    valid, duration = known[during], (strong[-1] - strong[0]) / sample_rate
-    first_mode = frame.specimen.frame.natural_frequencies[0]
-    if duration * first_mode < FEWEST * 2.0 * np.pi or valid.mean() < COMPLETE:
-        return None
+    valid = np.isfinite(signals[during, DRIFT])
     times = np.arange(valid.size)
     drift, first, second, table = (
         np.interp(times, times[valid], signals[during, column][valid])

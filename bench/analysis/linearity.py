@@ -56,6 +56,11 @@ class Effect:
     places: Array
     weights: Array
 
+    @property
+    def reversed(self) -> "Effect":
+        """The effect on the negative of the peak."""
+        return Effect(self.places, -self.weights)
+
 
 @dataclass(frozen=True, eq=False)
 class LinearityErrors:

@@ -7,6 +7,8 @@ of scale causes no harmonics: it is neither found nor corrected.
 
 The readings of calibrated lasers have been corrected by their curves, which hold the error constant beyond the
 calibrated readings. There it is continued by the expected error relative to that at the nearer end.
+
+Where the errors were found in the tests themselves (`bench.analysis.laser_curves`), these are subtracted.
 """
 
 from collections.abc import Sequence
@@ -30,7 +32,9 @@ for the shortest of the assumed waves.
 
 @dataclass(frozen=True)
 class ReadingCorrection:
-    """Correction according to the checks of `sensors` or, beyond the calibrated readings, to their calibration."""
+    """Correction according to the curves or the checks of `sensors` or, beyond the calibrated readings, according to
+    their calibration.
+    """
 
     sensors: SensorUncertainty
 
@@ -52,6 +56,8 @@ class ReadingCorrection:
         """Expected errors [m] of laser 0 or 1, shape (n,), which are subtracted from its `readings` [m]."""
         if not self.sensors.corrected:
             return np.zeros(readings.size)
+        if self.sensors.curves is not None:
+            return self.sensors.curves.expected(laser, readings)
         return np.interp(readings, *self._curves[laser])
 
     @cached_property

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from bench.analysis.draws import Draws
 from bench.analysis.error_curve import Checks, Harmonics, widest
 from bench.analysis.laser_calibration import LaserCalibration
-from bench.analysis.linearity import SMOOTH, Effect, LinearityErrors, linearity_errors
+from bench.analysis.laser_curves import LaserCurves, laser_curves
+from bench.analysis.linearity import SMOOTH, Effect, LinearFrame, LinearityErrors, linearity_errors
 from bench.analysis.peak_readings import PeakReadings, Shapes, beyond, shares_of
 from sim.parameters import Parameters, quantity
 
@@ -70,7 +71,8 @@ class SensorUncertainty:
 
     `ranges` are the lasers' measuring ranges [m]; `checks` are the harmonics of their readings in tests of the bare
     frame; `corrected` states whether the readings are corrected for the errors that the checks, or the calibration
-    beyond its readings, lead to expect (`bench.analysis.reading_correction`).
+    beyond its readings, lead to expect (`bench.analysis.reading_correction`). `curves` are errors found in the tests
+    themselves, which replace the checks and the data sheet.
     """
 
     accuracy: SensorAccuracy
@@ -78,6 +80,7 @@ class SensorUncertainty:
     calibration: LaserCalibration | None = None
     checks: tuple[Checks, ...] = ()
     corrected: bool = False
+    curves: LaserCurves | None = None
 
     @property
     def table_scale(self) -> float:
@@ -86,8 +89,8 @@ class SensorUncertainty:
 
     @property
     def shapes_known(self) -> bool:
-        """Whether the shapes of the lasers' linearity errors were calibrated or checked."""
-        return self.calibration is not None or bool(self.checks)
+        """Whether the shapes of the lasers' linearity errors were calibrated, checked or found."""
+        return self.calibration is not None or self.curves is not None or bool(self.checks)
 
     def linearity_amplitude(self, laser: int, displacements: Array) -> float:
         """Amplitude [m] of the linearity error of laser 0 or 1 at `displacements` from rest [m], NaN where missing.
@@ -117,6 +120,20 @@ class SensorUncertainty:
             return self
         return replace(self, checks=() if checks is None else (checks,), corrected=True)
 
+    def found_in(
+        self, tests: Sequence[Array], frame: LinearFrame, sample_rate: float, block: float
+    ) -> "SensorUncertainty":
+        """A copy for readings corrected for the errors that the signals of `tests` reveal, with residuals that may be
+        correlated for `block` seconds (`bench.analysis.laser_curves`); the same object if `block` is zero, if the
+        lasers are calibrated, or if the tests reveal none.
+        """
+        if not block or self.calibration is not None:
+            return self
+        first, second = (self.accuracy.laser_linearity * whole for whole in self.ranges)
+        mismatch = self.accuracy.laser_mismatch
+        curves = laser_curves(tests, frame, sample_rate, (first, second), self.ranges, mismatch, block)
+        return self if curves is None else replace(self, checks=(), corrected=True, curves=curves)
+
     def checks_of(self, laser: int) -> list[Harmonics]:
         """The checks of laser 0 or 1 that are evaluated, with the uncertainty due to its resolution."""
         step = self.accuracy.laser_resolution
@@ -130,22 +147,33 @@ class SensorUncertainty:
         `shapes` are the linearity errors of `seen`, or of motions that hardly differ; by default they are
         computed.
         """
-        found = self.shapes(seen) if shapes is None else shapes
-        first, second = (self._linearity(laser, found.lasers[laser], seen, draws) for laser in (0, 1))
-        common = 0.0 if found.common is None else found.common.draws(draws.normal(len(seen)))
-        errors = {LINEARITY: second - first + common}
-        mismatch = self.accuracy.laser_mismatch
-        if self.calibration is not None:
-            mismatch = self.calibration.differential_uncertainty
-        means = np.array([[0.5 * sum(each.lasers) - 0.5 * float(each.zero.mean(axis=1).sum())] for each in seen])
-        errors[SCALES] = means * mismatch * draws.normal()
+        if self.curves is not None:
+            # the difference between the scales is one of the errors found
+            effects = [(each.effect(0).reversed, each.effect(1)) for each in seen]
+            errors = {LINEARITY: self.curves.errors(effects).draws(draws.normal(len(seen)))}
+        else:
+            errors = self._shaped(seen, draws, self.shapes(seen) if shapes is None else shapes)
         errors[TIMING] = np.array([self.late(each, 1, draws) - self.late(each, 0, draws) for each in seen])
         errors[STEPS] = np.array([self.steps(each, 0, draws) + self.steps(each, 1, draws) for each in seen])
         sides = np.array([[each.sign] for each in seen])
         return {name: sides * each for name, each in errors.items()}
 
+    def _shaped(self, seen: Sequence[PeakReadings], draws: Draws, shapes: Shapes) -> dict[str, Array]:
+        """Errors [m] due to linearity, according to `shapes`, and due to the difference between the scales."""
+        first, second = (self._linearity(laser, shapes.lasers[laser], seen, draws) for laser in (0, 1))
+        common = 0.0 if shapes.common is None else shapes.common.draws(draws.normal(len(seen)))
+        mismatch = self.accuracy.laser_mismatch
+        if self.calibration is not None:
+            mismatch = self.calibration.differential_uncertainty
+        means = np.array([[0.5 * sum(each.lasers) - 0.5 * float(each.zero.mean(axis=1).sum())] for each in seen])
+        return {LINEARITY: second - first + common, SCALES: means * mismatch * draws.normal()}
+
     def linearity(self, laser: int, seen: Sequence[PeakReadings], draws: Draws) -> Array:
         """Errors [m] of the peaks due to the linearity of laser 0 or 1, in each test, shape (tests, n)."""
+        if self.curves is not None:
+            effects = [each.effect(laser) for each in seen]
+            pairs = [(effect, None) if laser == 0 else (None, effect) for effect in effects]
+            return self.curves.errors(pairs).draws(draws.normal(len(seen)))
         return self._linearity(laser, self._shape(laser, seen), seen, draws)
 
     def u1_linearity(self, seen: Sequence[PeakReadings], table: Sequence[float], draws: Draws) -> Array:
@@ -185,8 +213,10 @@ class SensorUncertainty:
 
     def _shape(self, laser: int, seen: Sequence[PeakReadings]) -> LinearityErrors | None:
         """Linearity errors of laser 0 or 1; for a calibrated laser, only those outside the calibrated range, None if no
-        reading is outside it.
+        reading is outside it. None if the curves were found.
         """
+        if self.curves is not None:
+            return None
         whole = self.ranges[laser]
         limit = self.accuracy.laser_linearity * whole
         effects = [each.effect(laser) for each in seen]

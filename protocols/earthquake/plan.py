@@ -131,6 +131,7 @@ class EarthquakePlan:
         self._pace = Pace(parameters, shakings, table.duration, left_out, check)
         self._check = check
         self._correction = ReadingCorrection(configuration.sensors.corrected_by(None))
+        self._checked = list[NDArray[np.float64]]()
         self._bare: dict[str, BareTest | str] = {}
         self._shortfalls: dict[str, str] = {}
         self._points = 0
@@ -163,7 +164,8 @@ class EarthquakePlan:
             outcome = yield from self._play(shaking, drive, GainMonitor(shaking.name, None, shaking.target.sample_rate))
             if not isinstance(outcome, Played):
                 raise RigError(NO_BLOCK)
-            found = check.evaluate(outcome.signals, self._configuration)
+            found = check.evaluate(self._correction(outcome.signals), self._configuration)
+            self._checked.append(outcome.signals)
         except InvalidInput as refused:
             yield Publish(Warned(f"the lasers are not checked, and alpha_2 is less accurate: {refused}"))
             found = None
@@ -198,19 +200,21 @@ class EarthquakePlan:
         outcome = yield from self._play(shaking, replication.drive, monitor)
         if not isinstance(outcome, Played):
             raise RigError(NO_BLOCK)
+        signals = self._correction(outcome.signals)
         try:
-            observed = self._observed(shaking, outcome.signals)
+            observed = self._observed(shaking, signals, self._correction)
         except InvalidInput as lost:
             yield Publish(Warned(f"{shaking.name}: the test of the bare frame cannot be evaluated: {lost}"))
             return f"the test of the bare frame cannot be evaluated: {lost}"
-        self._histories.bare(shaking, outcome.signals, History.of(self._specimen.bare(), observed.base).drift)
+        self._histories.bare(shaking, signals, History.of(self._specimen.bare(), observed.base).drift)
         return BareTest(
             replication.drive,
             replication.passes,
             replication.status,
             observed,
+            signals,
+            tracking(shaking, signals),
             outcome.signals,
-            tracking(shaking, outcome.signals),
         )
 
     def _learning(self) -> ReplicationParameters:
@@ -251,45 +255,57 @@ class EarthquakePlan:
         if isinstance(outcome, Played):
             play = f"beta = {specimen.label:g}"
             yield Publish(table_motion(shaking.name, play, shaking.target, outcome.signals[:, ACCELERATION]))
+            correction = self._found_in(bare.raw, outcome.signals)
+            signals = correction(outcome.signals)
             try:
-                observed = self._observed(shaking, outcome.signals)
+                observed = self._observed(shaking, signals, correction)
+                if correction is not self._correction:
+                    again = correction(bare.raw)
+                    bare = replace(bare, observed=self._observed(shaking, again, correction), signals=again)
             except InvalidInput as lost:
                 return unplayed_point(shaking, specimen.label or 0.0, target, bare, f"not evaluated: {lost}")
             expected = History.of(specimen, observed.base).drift
-            self._histories.coupled(shaking, specimen.label or 0.0, outcome.signals, expected)
+            self._histories.coupled(shaking, specimen.label or 0.0, signals, expected)
             return measured_point(
                 shaking,
                 specimen,
                 bare,
-                outcome.signals,
+                signals,
                 observed,
                 target,
                 self._configuration,
                 p.draws,
                 seed,
-                self._correction.sensors,
+                correction.sensors,
             )
-        signals = bare.signals[:0] if outcome.signals is None else outcome.signals
+        signals = bare.signals[:0] if outcome.signals is None else self._correction(outcome.signals)
         return overturned_point(shaking, specimen, bare, signals, target, self._configuration, p.draws, seed)
 
-    def _observed(self, shaking: Shaking, signals: NDArray[np.float64]) -> Observed:
-        """Evaluate the signals of a record. The zero from momentum has the errors of the lasers at all places of the
-        motion: it is evaluated if these errors were calibrated or their shapes checked.
+    def _found_in(self, *tests: NDArray[np.float64]) -> ReadingCorrection:
+        """Correction for the errors of the lasers that these tests, and the check, reveal; otherwise that of the
+        campaign.
         """
-        frame = linear_frame(self._configuration) if self._correction.sensors.shapes_known else None
+        before, frame = self._correction.sensors, linear_frame(self._configuration)
+        block = self._parameters.laser_block or 0.0
+        sensors = before.found_in([*self._checked, *tests], frame, self._configuration.sample_rate, block)
+        return self._correction if sensors is before else ReadingCorrection(sensors)
+
+    def _observed(self, shaking: Shaking, signals: NDArray[np.float64], correction: ReadingCorrection) -> Observed:
+        """Evaluate the corrected signals of a record. The zero from momentum has the errors of the lasers at all places
+        of the motion: it is evaluated if these errors were calibrated or found, or their shapes checked.
+        """
+        frame = linear_frame(self._configuration) if correction.sensors.shapes_known else None
         return observe(signals, shaking.target.rest, shaking.target.sample_rate, frame)
 
     def _play(
         self, shaking: Shaking, drive: NDArray[np.float64], monitor: GainMonitor
     ) -> Generator[Step, Outcome, Played | Fallen]:
-        """Play a drive and the decay after it, and ramp out; a fall during the ramp is treated as a fall under the
-        record.
+        """Play a drive and the decay after it, and ramp out; the signals are not corrected. A fall during the ramp is
+        treated as a fall under the record.
         """
         yield Arm(self._parameters.rest)
         outcome = yield Play(shaking.volts(drive, self._parameters.decay), monitor)
         ended = yield RampOut(fast=isinstance(outcome, Fallen))
-        if isinstance(outcome, Played | Fallen) and outcome.signals is not None:
-            outcome = replace(outcome, signals=self._correction(outcome.signals))
         if isinstance(outcome, Played):
             return Fallen(outcome.signals) if isinstance(ended, Fallen) else outcome
         if isinstance(outcome, Fallen):

@@ -27,7 +27,9 @@ CHANCE_NOTE = 0.05
 
 @dataclass(frozen=True, eq=False)
 class BareTest:
-    """Test of the bare frame under one record: the iterated `drive` [V], the peaks, and the `signals`."""
+    """Test of the bare frame under one record: the iterated `drive` [V], the peaks, and the `signals`, whose readings
+    are corrected; `raw` are those before the correction.
+    """
 
     drive: Array
     passes: tuple[Pass, ...]
@@ -35,6 +37,7 @@ class BareTest:
     observed: Observed
     signals: Array
     tracking: Tracking
+    raw: Array
 
 
 def shared_fields(shaking: Shaking, beta: float, target_gain: float | None, bare: BareTest | None) -> dict[str, object]:

@@ -2,7 +2,7 @@
 
     python -m tests.benchmarks.coverage [--benches 40] [--points 16,0.40 20,0.25] [--only default "short waves"]
     python -m tests.benchmarks.coverage --budget          # sources switched off one by one
-    python -m tests.benchmarks.coverage --record l-aquila [--beta 0.25] [--laser-check] [--periods 0.5 2 4]
+    python -m tests.benchmarks.coverage --record l-aquila [--beta 0.25] [--source check] [--periods 0.5 2 4]
 
 Each bench draws a specimen from the assumed uncertainty, lasers (scale, linearity, clock, rest, noise), the scale of
 the table's sensors, and the harmonics and amplitude that the control of the table leaves. The exact motion of the
@@ -260,15 +260,20 @@ def main() -> None:
     parser.add_argument("--budget", action="store_true", help="the default sensors, sources switched off one by one")
     parser.add_argument("--record", help="under this synthetic record instead of under sines")
     parser.add_argument("--beta", nargs="+", type=float, default=ASKED.beta, help="stiffness ratios under the record")
-    parser.add_argument("--laser-check", action="store_true", help="with the check of the lasers before the record")
+    parser.add_argument(
+        "--source",
+        choices=("motion", "check", "data sheet"),
+        default="motion",
+        help="under the record, what the linearity errors of lasers without calibration are known from",
+    )
     parser.add_argument(
         "--periods", nargs="+", type=float, default=[], help="under the record, periods of the linearity errors"
     )
     asked = parser.parse_args()
-    if asked.record is None and (asked.beta is not ASKED.beta or asked.laser_check or asked.periods):
-        parser.error("--beta, --laser-check and --periods apply to --record")
+    if asked.record is None and (asked.beta is not ASKED.beta or asked.source != "motion" or asked.periods):
+        parser.error("--beta, --source and --periods apply to --record")
     if asked.record is not None:
-        seismic(asked.benches, asked.record, asked.beta, asked.periods, checked=asked.laser_check)
+        seismic(asked.benches, asked.record, asked.beta, asked.periods, asked.source)
         return
     points = [(float(omega), float(beta)) for omega, beta in (each.split(",") for each in asked.points)]
     cases = [CASES[name] for name in asked.only]

@@ -165,16 +165,22 @@ def run(folder: Path, bench: Path, *options: str) -> dict[str, Any]:
     return point
 
 
-def test_a_check_narrows_the_uncertainty_and_the_file_replays(
+def test_a_check_narrows_the_uncertainty_and_the_motion_even_more_and_the_files_replay(
     bench: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    without = run(tmp_path / "without", bench)
+    without = run(tmp_path / "without", bench, "--laser-block", "0")
     assert "--laser-check measures" in capsys.readouterr().out
-    checked = run(tmp_path / "checked", bench, "--laser-check")
+    checked = run(tmp_path / "checked", bench, "--laser-check", "--laser-block", "0")
     assert "--laser-check measures" not in capsys.readouterr().out
-    assert checked["agrees"] is True
-    assert checked["alpha_2"] == pytest.approx(without["alpha_2"], rel=0.005)
+    found = run(tmp_path / "found", bench)
+    assert "--laser-check measures" not in capsys.readouterr().out
+    for one in (checked, found):
+        assert one["agrees"] is True
+        assert one["alpha_2"] == pytest.approx(without["alpha_2"], rel=0.005)
     assert checked["alpha_2_uncertainty"] < 0.4 * without["alpha_2_uncertainty"]
+    assert found["alpha_2_uncertainty"] < 0.1 * without["alpha_2_uncertainty"]
+    # the specimen of the simulated bench is the one that is predicted
+    assert found["alpha_2"] == pytest.approx(found["alpha_2_predicted"], rel=0.002)
     recommended: list[bool] = []
     for name in ("without", "checked"):
         with open_datafile(path := tmp_path / name / "campaign.h5") as record:
@@ -189,9 +195,10 @@ def test_a_check_narrows_the_uncertainty_and_the_file_replays(
     for beta, peak in ((None, checked["bare_drift_peak_m"]), (0.25, checked["drift_peak_m"])):
         largest = max(row["drift_peak"] for row in running if row["beta"] == beta)
         assert largest == pytest.approx(peak, rel=0.005)
-    capsys.readouterr()
-    assert main(["replay", str(tmp_path / "checked" / "campaign.h5")]) == 0
-    assert "Bit-identical to the file" in "".join(capsys.readouterr())
+    for name in ("checked", "found"):
+        capsys.readouterr()
+        assert main(["replay", str(tmp_path / name / "campaign.h5")]) == 0
+        assert "Bit-identical to the file" in "".join(capsys.readouterr())
 
 
 def texts(section: Section) -> list[str]:

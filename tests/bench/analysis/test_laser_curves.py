@@ -1,0 +1,254 @@
+"""Error curves of the lasers from the motion of the second storey, on motions that another solver made."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from math import tau
+
+import numpy as np
+import pytest
+from scipy import signal
+from scipy.integrate import solve_ivp
+from scipy.interpolate import CubicSpline
+
+from bench.analysis.draws import Draws
+from bench.analysis.laser_curves import LaserCurves, laser_curves
+from bench.analysis.linearity import Effect, LinearFrame
+from bench.analysis.peak_readings import PeakReadings
+from bench.analysis.sensor_accuracy import LINEARITY, SCALES, SensorAccuracy, SensorUncertainty
+from bench.analysis.signals import ACCELERATION, DISPLACEMENT, DRIFT, LASER_1, LASER_2, SIGNALS, U1
+from bench.analysis.storey_equations import storey_motion
+from sim.specimen import Specimen
+from tests.bench.calibrated import calibration
+
+RATE, LIMIT, WHOLE, MISMATCH, BLOCK = 500.0, 1.6e-4, 0.2, 1e-3, 2.0
+SPECIMEN = Specimen()
+K, C = SPECIMEN.frame.k2 / SPECIMEN.frame.m2, SPECIMEN.frame.dashpots[1] / SPECIMEN.frame.m2
+TIME = np.arange(round(24.0 * RATE)) / RATE
+GROUND, TABLE = (LinearFrame(SPECIMEN, grounded=grounded) for grounded in (True, False))
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Displacements [m] of the table and, absolute, of both storeys; acceleration of the table [m/s2]."""
+
+    table: Array
+    first: Array
+    second: Array
+    acceleration: Array
+
+    @property
+    def drift(self) -> Array:
+        return self.second - self.first
+
+
+def motion(seed: int, softer: float = 1.0, cubic: float = 0.0, friction: float = 0.0, stroke: float = 0.03) -> Motion:
+    """The second storey above a first one that something moves for 16 s: any table, and any force on it.
+
+    The upper columns have `softer` times the nominal stiffness, which increases by `cubic` times the square of the
+    drift, and a friction that is this share of the largest elastic force.
+    """
+    random = np.random.default_rng(seed)
+    rise = np.clip(np.minimum(TIME - 2.0, 18.0 - TIME), 0.0, 1.0)
+    lowest, highest = 0.8, 5.0
+    band = signal.butter(4, (lowest, highest), "bandpass", fs=RATE, output="sos")
+    first, table = (signal.sosfiltfilt(band, random.standard_normal(TIME.size)) for _ in range(2))
+    first, table = (each * rise / np.abs(each).max() for each in (first, table))
+    first, table = stroke * first, 0.6 * stroke * table
+    below, k, yielding = CubicSpline(TIME, first), softer * K, friction * K * 0.05
+
+    def rate(t: float, y: Array) -> list[float]:
+        drift, speed = y[0] - below(t), y[1] - below(t, 1)
+        force = k * (1.0 + cubic * drift**2) * drift + C * speed + yielding * np.tanh(speed / 1e-3)
+        return [y[1], -force]
+
+    found = solve_ivp(rate, (0.0, TIME[-1]), [0.0, 0.0], t_eval=TIME, rtol=1e-9, atol=1e-10, max_step=0.05)
+    acceleration = CubicSpline(TIME, table)(TIME, 2)
+    return Motion(table, first, found.y[0], acceleration)
+
+
+def curve(waves: float, phase: float, slope: float = 0.0) -> Callable[[Array], Array]:
+    """Error of a laser [m] as a function of the true displacement, zero at rest."""
+    return lambda x: LIMIT * (np.sin(tau * waves * x / WHOLE + phase) - np.sin(phase)) + slope * x
+
+
+def signals(
+    moved: Motion,
+    errors: tuple[Callable[[Array], Array], Callable[[Array], Array]],
+    noise: float = 0.0,
+    seed: int = 0,
+    grounded: bool = True,
+) -> Array:
+    found = np.zeros((TIME.size, len(SIGNALS)))
+    found[:, DISPLACEMENT], found[:, ACCELERATION] = moved.table, moved.acceleration
+    random = np.random.default_rng([seed, 7])
+    base = 0.0 if grounded else moved.table
+    for column, storey, error in zip((LASER_1, LASER_2), (moved.first, moved.second), errors, strict=True):
+        found[:, column] = storey - base + error(storey - base) + noise * random.standard_normal(TIME.size)
+    found[:, DRIFT] = found[:, LASER_2] - found[:, LASER_1]
+    found[:, U1] = found[:, LASER_1] - (moved.table if grounded else 0.0)
+    return found
+
+
+def found_in(*tests: Array, frame: LinearFrame = GROUND) -> LaserCurves | None:
+    return laser_curves(tests, frame, RATE, (LIMIT, LIMIT), (WHOLE, WHOLE), MISMATCH, BLOCK)
+
+
+def peaks(found: LaserCurves, tests: list[tuple[Motion, Array]]) -> tuple[float, float, float]:
+    """Relative errors of the ratio of the largest drifts of two tests: with raw and with corrected readings, and the
+    stated standard uncertainty of the latter.
+    """
+    raw, corrected, effects = [], [], list[tuple[Effect, Effect]]()
+    for moved, seen in tests:
+        place = int(np.abs(moved.drift).argmax())
+        first, second = seen[place, LASER_1], seen[place, LASER_2]
+        true, share = moved.drift[place], 1.0 / moved.drift[place]
+        raw.append((second - first) * share - 1.0)
+        expected = [found.expected(k, np.array([each]))[0] for k, each in enumerate((first, second))]
+        corrected.append((second - expected[1] - first + expected[0] - true) * share)
+        places = [np.array([each, 0.0]) for each in (first, second)]
+        weights = np.array([share, -share])
+        effects.append((Effect(places[0], -weights), Effect(places[1], weights)))
+    moments = found.errors(effects).moments
+    stated = float(np.sqrt(moments[0, 0] + moments[1, 1] - 2.0 * moments[0, 1]))
+    return raw[1] - raw[0], corrected[1] - corrected[0], stated
+
+
+MOTIONS = [motion(1), motion(2, stroke=0.02)]
+
+
+@pytest.mark.parametrize(("frame", "grounded"), [(GROUND, True), (TABLE, False)])
+def test_exact_readings_leave_nothing_in_the_equations(frame: LinearFrame, grounded: bool) -> None:
+    """Also with another stiffness than the nominal one, which is fitted."""
+    none = curve(0.0, 0.0)
+    for moved in (MOTIONS[0], motion(3, softer=0.93)):
+        seen = storey_motion(signals(moved, (none, none), grounded=grounded), frame, RATE)
+        assert seen is not None
+        rows, values = seen.equations((np.atleast_2d, np.atleast_2d))
+        assert rows.shape == (seen.number, 3)
+        assert np.sqrt(np.mean(values**2)) < 1e-6
+
+
+@pytest.mark.parametrize(("waves", "other", "grounded"), [(0.7, 1.2, True), (3.5, 0.8, False), (4.6, 5.3, True)])
+def test_the_errors_of_a_ratio_become_small_and_are_as_large_as_stated(
+    waves: float, other: float, grounded: bool
+) -> None:
+    raw, left, stated = [], [], []
+    for number in range(12):
+        phases = np.random.default_rng([number, 3]).uniform(0.0, tau, 2)
+        slope = MISMATCH * np.random.default_rng([number, 4]).standard_normal()
+        errors = curve(waves, phases[0]), curve(other, phases[1], slope)
+        seen = [signals(each, errors, 1.5e-5, 2 * number + k, grounded) for k, each in enumerate(MOTIONS)]
+        found = found_in(*seen, frame=GROUND if grounded else TABLE)
+        assert found is not None
+        exact = [signals(each, errors, grounded=grounded) for each in MOTIONS]
+        one = peaks(found, list(zip(MOTIONS, exact, strict=True)))
+        for values, value in zip((raw, left, stated), one, strict=True):
+            values.append(value)
+    off = np.array(left) / np.array(stated)
+    assert np.sqrt(np.mean(np.square(left))) < 0.05 * np.sqrt(np.mean(np.square(raw)))
+    assert 0.3 < np.sqrt(np.mean(off**2)) < 1.4
+    assert np.abs(off).max() < 3.5
+
+
+@pytest.mark.parametrize(("cubic", "friction"), [(40.0, 0.0), (0.0, 0.01), (40.0, 0.01)])
+def test_stiffness_that_is_not_constant_and_friction_cause_no_false_errors(cubic: float, friction: float) -> None:
+    """Up to 16 % more stiffness at the largest drift, and a friction of 1 % of the largest force."""
+    tests = [motion(seed, cubic=cubic, friction=friction, stroke=stroke) for seed, stroke in ((1, 0.03), (2, 0.02))]
+    errors = curve(1.5, 1.0), curve(1.2, 2.0)
+    seen = [signals(each, errors, 1.5e-5, k) for k, each in enumerate(tests)]
+    found = found_in(*seen)
+    assert found is not None
+    exact = [signals(each, errors) for each in tests]
+    _, left, stated = peaks(found, list(zip(tests, exact, strict=True)))
+    # the linearity errors are up to 0.5 % of these drifts
+    assert stated < 5e-4
+    assert abs(left) < 3.0 * stated
+
+
+def test_a_delay_that_wanders_between_the_lasers_causes_no_false_errors() -> None:
+    """A held reading of a laser at 4 kHz becomes older and younger by its period of 0.25 ms within 7 s."""
+    moved, none = MOTIONS[0], curve(0.0, 0.0)
+    seen = signals(moved, (none, none), 1.5e-5)
+    late = 2.5e-4 * ((TIME / 7.0) % 1.0 - 0.5)
+    seen[:, LASER_2] -= late * np.gradient(moved.second, 1.0 / RATE)
+    seen[:, DRIFT] = seen[:, LASER_2] - seen[:, LASER_1]
+    found = found_in(seen)
+    assert found is not None
+    places = np.linspace(0.8 * moved.second.min(), 0.8 * moved.second.max(), 20)
+    bent = found.expected(1, places)
+    bent -= np.polyval(np.polyfit(places, bent, 1), places)
+    # the delay shifts readings by up to 0.1 mm
+    assert np.abs(bent).max() < 1e-5
+
+
+def test_more_tests_of_the_same_lasers_tell_more() -> None:
+    errors = curve(1.5, 1.0), curve(2.2, 2.0)
+    one, two = (signals(each, errors, 1.5e-5, k) for k, each in enumerate(MOTIONS))
+    alone, both = found_in(two), found_in(one, two)
+    assert alone is not None
+    assert both is not None
+    effect = [(None, Effect(np.array([-0.02, 0.0, 0.02]), np.array([1.0, -2.0, 1.0])))]
+    assert both.errors(effect).moments[0, 0] < alone.errors(effect).moments[0, 0]
+
+
+def test_missing_samples_are_bridged_and_a_motion_without_enough_of_them_tells_nothing() -> None:
+    errors = curve(1.5, 1.0), curve(1.2, 2.0)
+    seen = signals(MOTIONS[0], errors, 1.5e-5)
+    whole = found_in(seen)
+    assert whole is not None
+    few = seen.copy()
+    few[::150, [LASER_1, DRIFT]] = np.nan
+    found = found_in(few)
+    assert found is not None
+    places = np.linspace(0.9 * whole.places[1][0], 0.9 * whole.places[1][-1], 9)
+    np.testing.assert_allclose(found.expected(1, places), whole.expected(1, places), atol=5e-6)
+    many = seen.copy()
+    many[::20, [LASER_1, DRIFT]] = np.nan
+    assert found_in(many) is None
+    assert found_in(np.zeros_like(seen)) is None
+    assert found_in(seen[:3500]) is None
+    # a further test that tells nothing changes nothing
+    beside = found_in(seen, many)
+    assert beside is not None
+    np.testing.assert_array_equal(beside.mean, whole.mean)
+
+
+def test_nothing_is_corrected_at_rest_and_a_missing_reading_stays_missing() -> None:
+    found = found_in(signals(MOTIONS[0], (curve(1.5, 1.0), curve(1.2, 2.0)), 1.5e-5))
+    assert found is not None
+    for laser in (0, 1):
+        expected = found.expected(laser, np.array([0.0, np.nan, 0.01]))
+        assert expected[0] == 0.0
+        np.testing.assert_array_equal(np.isnan(expected), [False, True, False])
+
+
+def test_the_sensors_have_the_errors_of_the_tests_unless_these_tell_none() -> None:
+    seen = signals(MOTIONS[0], (curve(1.5, 1.0), curve(1.2, 2.0)), 1.5e-5)
+    plain = SensorUncertainty(SensorAccuracy(), (WHOLE, WHOLE))
+    found = plain.found_in([seen], GROUND, RATE, BLOCK)
+    assert found.shapes_known
+    assert found.corrected
+    assert found.curves is not None
+    assert plain.found_in([seen], GROUND, RATE, 0.0) is plain
+    assert plain.found_in([np.zeros_like(seen)], GROUND, RATE, BLOCK) is plain
+    calibrated = replace(plain, calibration=calibration(-0.1, 0.1))
+    assert calibrated.found_in([seen], GROUND, RATE, BLOCK) is calibrated
+    readings = PeakReadings(
+        drift=0.02,
+        sign=1.0,
+        lasers=(0.01, 0.03),
+        speeds=(0.0, 0.0),
+        zero=np.zeros((2, 1)),
+        swings=(0.01, 0.01),
+        at_rest=True,
+    )
+    draws = Draws(np.random.default_rng(1), 400)
+    errors = found.drift_errors([readings, readings], draws)
+    # the difference between the scales is one of the errors that were found
+    assert SCALES not in errors
+    expected = found.curves.errors([(readings.effect(0).reversed, readings.effect(1))]).moments[0, 0] ** 0.5
+    assert np.std(errors[LINEARITY][0]) == pytest.approx(expected, rel=0.15)
+    np.testing.assert_allclose(errors[LINEARITY][0], errors[LINEARITY][1], atol=1e-12)
+    assert found.u1_linearity([readings], [0.0], draws).shape == (1, 400)
