@@ -45,7 +45,7 @@ class LaserCurves:
 
     `places` are the readings [m] at which the curves are described, shapes (n,) and (m,). `mean`, shape (n + m + 1,),
     and `covariance` are those of the errors there [m], of laser 1 and of laser 2, and of the scale of laser 2 relative
-    to that of laser 1. `noise` [m] is the standard deviation of an equation.
+    to that of laser 1. `noise` [m] is the rms standard deviation of an equation.
     """
 
     places: tuple[Array, Array]
@@ -62,6 +62,13 @@ class LaserCurves:
         known = np.isfinite(readings)
         found[known] = curve(np.clip(readings[known], places[0], places[-1])) - curve(np.zeros(1))
         return found + scale * readings
+
+    def bend(self, laser: int) -> float:
+        """Largest deviation of the expected errors of laser 0 or 1 from a straight line [m]."""
+        places = self.places[laser]
+        errors = self.expected(laser, places)
+        straight = np.stack((places, np.ones(places.size)), axis=1)
+        return float(np.abs(errors - straight @ np.linalg.lstsq(straight, errors, rcond=None)[0]).max())
 
     def errors(self, effects: Sequence[tuple[Effect | None, Effect | None]]) -> LinearityErrors:
         """Errors of quantities of corrected readings, each with the effects on it of the errors of both lasers, None
@@ -110,7 +117,9 @@ def laser_curves(
     observed = _observed(rows, values, _blocks(moved, block), priors[0][FLEXIBLE], priors[1][FLEXIBLE])
     mean, covariance = _posterior(observed, priors[0], priors[1])
     sizes = np.append(np.ones(mean.size - 1), mismatch)
-    return LaserCurves((first, second), sizes * mean, np.outer(sizes, sizes) * covariance, observed.noise)
+    return LaserCurves(
+        (first, second), sizes * mean, np.outer(sizes, sizes) * covariance, float(np.sqrt(np.mean(observed.noise**2)))
+    )
 
 
 def _places(readings: Array, spacing: float) -> Array:
@@ -143,12 +152,12 @@ def _blocks(moved: Sequence[StoreyMotion], block: float) -> NDArray[np.intp]:
 @dataclass(frozen=True, eq=False)
 class _Observed:
     """Independent combinations of the equations: `rows`, shape (k, n + m + 1), and `values`, shape (k,), with the
-    standard deviation `noise` [m].
+    standard deviations `noise`, shape (k,) [m].
     """
 
     rows: Array
     values: Array
-    noise: float
+    noise: Array
 
 
 def _observed(rows: Array, values: Array, blocks: NDArray[np.intp], first: Array, second: Array) -> _Observed:
@@ -165,24 +174,26 @@ def _observed(rows: Array, values: Array, blocks: NDArray[np.intp], first: Array
     beside, free = max(float(values @ values - seen @ seen), 0.0), values.size - seen.size
     spread = variances + NOISES[:, None] ** 2
     evidence = -0.5 * (np.sum(seen**2 / spread + np.log(spread), axis=1) + beside / NOISES**2) - free * np.log(NOISES)
-    noise = float(NOISES[evidence.argmax()])
+    noise = np.full(seen.size, NOISES[evidence.argmax()])
     # residuals of curves that follow correlated errors less closely show more of them
     for _ in range(2):
-        noise = max(noise, _correlated(left, seen, values, blocks, variances, noise))
+        noise = np.maximum(noise, _correlated(left, seen, values, blocks, variances, noise))
     useful = variances > USEFUL * noise**2
-    return _Observed(combined[useful], seen[useful], noise)
+    return _Observed(combined[useful], seen[useful], noise[useful])
 
 
 def _correlated(
-    left: Array, seen: Array, values: Array, blocks: NDArray[np.intp], variances: Array, noise: float
-) -> float:
-    """Standard deviation of independent residuals that would contribute as much to the useful combinations, `seen` =
-    left^T values with the prior `variances`, as the residuals of whole blocks do [m].
+    left: Array, seen: Array, values: Array, blocks: NDArray[np.intp], variances: Array, noise: Array
+) -> Array:
+    """Standard deviation of independent residuals that would contribute as much to each combination, `seen` = left^T
+    values with the prior `variances`, as the residuals of whole blocks do [m]. The variances of few blocks scatter:
+    each is averaged with the mean over all useful combinations.
     """
     useful = variances > USEFUL * noise**2
     residual = values - left @ (seen * variances / (variances + noise**2))
-    summed = np.add.reduceat(left[:, useful] * residual[:, None], blocks, axis=0)
-    return float(np.sqrt(np.sum(summed**2) / max(np.count_nonzero(useful), 1)))
+    squares = np.sum(np.add.reduceat(left * residual[:, None], blocks, axis=0) ** 2, axis=0)
+    mean = float(squares[useful].mean()) if useful.any() else 0.0
+    return np.sqrt(0.5 * (mean + squares))
 
 
 def _posterior(observed: _Observed, first: Array, second: Array) -> tuple[Array, Array]:
@@ -193,7 +204,7 @@ def _posterior(observed: _Observed, first: Array, second: Array) -> tuple[Array,
     crossed = [rows[:, :n] @ first, rows[:, n:-1] @ second]
     own = crossed[0] @ rows[:, :n].T
     others = crossed[1] @ rows[:, n:-1].T + np.outer(rows[:, -1], rows[:, -1])
-    others = others + observed.noise**2 * np.eye(len(rows))
+    others = others + np.diag(observed.noise**2)
     factors = np.linalg.cholesky(own[:, None] + others[None])
     white = np.linalg.solve(factors, np.broadcast_to(observed.values[:, None], (*factors.shape[:3], 1)))[..., 0]
     evidence = -0.5 * np.sum(white**2, axis=-1) - np.log(np.diagonal(factors, axis1=-2, axis2=-1)).sum(axis=-1)

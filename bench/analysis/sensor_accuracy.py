@@ -25,6 +25,11 @@ from sim.parameters import Parameters, quantity
 
 Array = NDArray[np.float64]
 
+EXCESS = 1.5
+"""Ratio to the data sheet above which a linearity error that was found is remarked on: the straight line of least
+squares is not the one with the smallest error.
+"""
+
 LINEARITY, SCALES, TIMING, STEPS = (
     "linearity of the lasers",
     "scales of the lasers",
@@ -231,7 +236,18 @@ class SensorUncertainty:
         return linearity_errors(outside, shares_of(seen), limit, whole, checks, self.corrected)
 
     def rough(self, shapes: Shapes) -> tuple[str, ...]:
-        """Remark on each laser whose linearity error, according to the tests of the bare frame, is not smooth."""
+        """Remark on each laser whose linearity error, according to the tests of the bare frame, is not smooth, or as
+        found in the tests themselves is larger than its data sheet states.
+        """
+        if self.curves is not None:
+            limits = [self.accuracy.laser_linearity * whole for whole in self.ranges]
+            bends = [self.curves.bend(laser) for laser in (0, 1)]
+            return tuple(
+                f"the linearity error of laser_{laser} is {1e3 * bend:.2f} mm; its data sheet allows {1e3 * limit:.2f} "
+                "mm (analysis.laser_linearity): check its mount, or measure it with `rockbench run laser-calibration`"
+                for laser, (bend, limit) in enumerate(zip(bends, limits, strict=True), 1)
+                if bend > EXCESS * limit
+            )
         if self.calibration is not None or not self.checks or self.accuracy.laser_linearity == 0.0:
             return ()
         return tuple(

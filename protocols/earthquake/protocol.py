@@ -89,13 +89,13 @@ class EarthquakeParameters(Parameters):
         "corrected, and alpha_2 has a smaller uncertainty",
     )
     laser_block: float | None = quantity(
-        2.0,
+        4.0,
         "s",
         "the errors of lasers without calibration are found from the motion of the second storey in both tests of a "
         "point, with residuals that may be correlated for this long; 0: as stated by the data sheet, or by the check",
         ge=0,
         le=60,
-        usual=(0.2, 20.0),
+        usual=(0.5, 20.0),
     )
     draws: int = quantity(
         200,

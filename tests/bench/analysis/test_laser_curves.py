@@ -20,7 +20,7 @@ from bench.analysis.storey_equations import storey_motion
 from sim.specimen import Specimen
 from tests.bench.calibrated import calibration
 
-RATE, LIMIT, WHOLE, MISMATCH, BLOCK = 500.0, 1.6e-4, 0.2, 1e-3, 2.0
+RATE, LIMIT, WHOLE, MISMATCH, BLOCK = 500.0, 1.6e-4, 0.2, 1e-3, 4.0
 SPECIMEN = Specimen()
 K, C = SPECIMEN.frame.k2 / SPECIMEN.frame.m2, SPECIMEN.frame.dashpots[1] / SPECIMEN.frame.m2
 TIME = np.arange(round(24.0 * RATE)) / RATE
@@ -135,7 +135,7 @@ def test_the_errors_of_a_ratio_become_small_and_are_as_large_as_stated(
     waves: float, other: float, grounded: bool
 ) -> None:
     raw, left, stated = [], [], []
-    for number in range(12):
+    for number in range(8):
         phases = np.random.default_rng([number, 3]).uniform(0.0, tau, 2)
         slope = MISMATCH * np.random.default_rng([number, 4]).standard_normal()
         errors = curve(waves, phases[0]), curve(other, phases[1], slope)
@@ -213,6 +213,20 @@ def test_missing_samples_are_bridged_and_a_motion_without_enough_of_them_tells_n
     beside = found_in(seen, many)
     assert beside is not None
     np.testing.assert_array_equal(beside.mean, whole.mean)
+
+
+def test_a_laser_that_errs_more_than_its_data_sheet_allows_is_named() -> None:
+    plain = SensorUncertainty(SensorAccuracy(), (WHOLE, WHOLE))
+    for times, named in ((1.0, 0), (3.0, 1)):
+
+        def larger(x: Array, times: float = times) -> Array:
+            return times * curve(1.5, 1.0)(x)
+
+        seen = [signals(each, (curve(1.2, 2.0), larger), 1.5e-5, k) for k, each in enumerate(MOTIONS)]
+        found = plain.found_in(seen, GROUND, RATE, BLOCK)
+        remarks = found.rough(found.shapes([]))
+        assert len(remarks) == named
+        assert all("laser_2 is 0." in each and "its data sheet allows 0.16 mm" in each for each in remarks)
 
 
 def test_nothing_is_corrected_at_rest_and_a_missing_reading_stays_missing() -> None:
