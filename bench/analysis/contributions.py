@@ -33,7 +33,7 @@ _DECAYS = "record more decays"
 _CLOCK = "calibrate the sample clock against a reference"
 
 SOURCES: Mapping[str, Source] = {
-    LINEARITY: Source("B", "data sheet or calibration, constrained by the test of the bare frame", _CALIBRATE),
+    LINEARITY: Source("B", "data sheet or calibration, constrained by the tests", _CALIBRATE),
     SCALES: Source("B", "assumed difference between the lasers' scales, or calibration", _CALIBRATE),
     TIMING: Source("B", "assumed wander of the delay: one measuring period", _FASTER),
     STEPS: Source("B", "resolution of the lasers; of calibrated ones, what a correction leaves", _FINER),

@@ -31,6 +31,12 @@ SPACING = 1.0 / 80.0
 FLEXIBLE = 10
 """Candidate with which the noise is estimated: an irregular curve with eight waves."""
 
+FEWEST = 4
+"""Minimum number of blocks of a test."""
+
+ROUNDING = 1e-10
+"""Relative size of a combination below which it is due to rounding."""
+
 USEFUL, LIKELY = 1e-3, 1e-3
 """Smallest variance of an observation relative to its noise, and smallest weight of a pair relative to the largest,
 that are not neglected."""
@@ -108,13 +114,16 @@ def laser_curves(
     )
     bases = _basis(first), _basis(second)
     found = [each.equations(bases) for each in moved]
-    rows, values = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    rows, values = (np.concatenate([each[k] for each in found]) for k in (0, 1))
+    removed = sum(each[2] for each in found)
     rows[:, -1] *= mismatch
     priors = [
         0.5 * limit**2 * covariances(places, np.eye(places.size), places, np.eye(places.size), whole)
         for places, limit, whole in zip((first, second), limits, ranges, strict=True)
     ]
-    observed = _observed(rows, values, _blocks(moved, block), priors[0][FLEXIBLE], priors[1][FLEXIBLE])
+    observed = _observed(rows, values, removed, _blocks(moved, block), priors[0][FLEXIBLE], priors[1][FLEXIBLE])
+    if not observed.values.size:
+        return None
     mean, covariance = _posterior(observed, priors[0], priors[1])
     sizes = np.append(np.ones(mean.size - 1), mismatch)
     return LaserCurves(
@@ -143,9 +152,9 @@ def _blocks(moved: Sequence[StoreyMotion], block: float) -> NDArray[np.intp]:
     """Index of the first equation of each block, in all tests."""
     firsts, before = list[NDArray[np.intp]](), 0
     for each in moved:
-        size = max(round(block * each.rate / KEPT), 1)
-        firsts.append(before + np.arange(0, each.number, size))
-        before += each.number
+        size = max(min(round(block * each.rate / KEPT), each.kept.size // FEWEST), 1)
+        firsts.append(before + np.arange(0, each.kept.size, size))
+        before += each.kept.size
     return np.concatenate(firsts)
 
 
@@ -160,18 +169,22 @@ class _Observed:
     noise: Array
 
 
-def _observed(rows: Array, values: Array, blocks: NDArray[np.intp], first: Array, second: Array) -> _Observed:
-    """The useful combinations of the equations, whose noise is estimated for curves with the prior covariances `first`
-    and `second`.
+def _observed(
+    rows: Array, values: Array, removed: int, blocks: NDArray[np.intp], first: Array, second: Array
+) -> _Observed:
+    """The useful combinations of the equations, from which `removed` columns were projected out. Their noise is
+    estimated for curves with the prior covariances `first` and `second`.
     """
     left, sizes, right = np.linalg.svd(rows, full_matrices=False)
+    present = sizes > ROUNDING * sizes[0]
+    left, sizes, right = left[:, present], sizes[present], right[present]
     combined, seen = sizes[:, None] * right, left.T @ values
     n = len(first)
     prior = combined[:, :n] @ first @ combined[:, :n].T + combined[:, n:-1] @ second @ combined[:, n:-1].T
     variances, turned = np.linalg.eigh(prior + np.outer(combined[:, -1], combined[:, -1]))
     variances = np.maximum(variances, 0.0)
     left, combined, seen = left @ turned, turned.T @ combined, turned.T @ seen
-    beside, free = max(float(values @ values - seen @ seen), 0.0), values.size - seen.size
+    beside, free = max(float(values @ values - seen @ seen), 0.0), values.size - removed - seen.size
     spread = variances + NOISES[:, None] ** 2
     evidence = -0.5 * (np.sum(seen**2 / spread + np.log(spread), axis=1) + beside / NOISES**2) - free * np.log(NOISES)
     noise = np.full(seen.size, NOISES[evidence.argmax()])
@@ -192,6 +205,8 @@ def _correlated(
     useful = variances > USEFUL * noise**2
     residual = values - left @ (seen * variances / (variances + noise**2))
     squares = np.sum(np.add.reduceat(left * residual[:, None], blocks, axis=0) ** 2, axis=0)
+    # the sum over all blocks vanishes
+    squares *= blocks.size / (blocks.size - 1)
     mean = float(squares[useful].mean()) if useful.any() else 0.0
     return np.sqrt(0.5 * (mean + squares))
 

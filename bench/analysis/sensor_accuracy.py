@@ -3,7 +3,8 @@
 Two tests use the same sensors, so every draw has the same pair of lasers for both tests (GUM Supplement 1): common
 errors cancel in the ratio of their drifts to the extent that they are equal.
 
-The shape of a laser's linearity error is unknown (`bench.analysis.linearity`); the test of the bare frame checks it.
+The shape of a laser's linearity error is unknown (`bench.analysis.linearity`); the test of the bare frame checks it, or
+the motions of a record reveal it (`bench.analysis.laser_curves`).
 For a calibrated laser, the uncertainty of the calibration applies to the covered readings. Beyond them, corrected
 readings have the uncertainty of the continued curve, and others that of the data sheet.
 """

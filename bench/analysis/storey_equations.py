@@ -15,7 +15,8 @@ the acceleration of the table is added.
 The equations are filtered by 1 / (1 + p omega^2), which leaves the white noise of r_2 white, and limited to the band of
 the motion. What else may be in a residual has columns of its own, which are projected out: changes of p and q, the
 square and the cube of the drift (stiffness that is not constant), the sign of its rate (friction), an offset, the
-table's acceleration, and the delay between the lasers, which wanders with their free-running clocks.
+table's acceleration, and the delay between the lasers, which wanders with their free-running clocks. With the stiffness
+1 + b d + c d^2, errors of the drift count with its slope 1 + 2 b d + 3 c d^2.
 """
 
 from collections.abc import Callable, Sequence
@@ -26,7 +27,7 @@ from math import ceil, pi, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.analysis.drift_zero import shortest, strong_part
+from bench.analysis.drift_zero import COMPLETE, shortest, strong_part
 from bench.analysis.linearity import LinearFrame
 from bench.analysis.signals import ACCELERATION, LASER_1, LASER_2
 
@@ -41,6 +42,10 @@ INNER, KEPT = 10.0, 4
 EDGE = 12.0
 """Time constants of the filter between an equation and the ends of the signals: errors there decay to 6e-6."""
 
+LONGEST, AROUND = 0.02, 8.0
+"""Longest gap in the readings that is bridged [s]; time constants of the filter around a longer one without equations.
+"""
+
 KNOTS = 1.0
 """Time between the values of the wandering delay, between which it is linear [s]."""
 
@@ -48,25 +53,20 @@ KNOTS = 1.0
 @dataclass(frozen=True, eq=False)
 class StoreyMotion:
     """Strong motion of a test at `rate` [Hz]: readings of both lasers relative to rest, shape (2, n) [m], and for
-    lasers on the table its acceleration, shape (n,) [m/s2]. There is an equation for every `KEPT`-th sample of `kept`;
-    `nominal` [s2] is the ratio of the second storey's mass and stiffness.
+    lasers on the table its acceleration, shape (n,) [m/s2]. There is an equation at each of the samples `kept`, shape
+    (number,); `nominal` [s2] is the ratio of the second storey's mass and stiffness.
     """
 
     rate: float
     readings: Array
     acceleration: Array | None
-    kept: slice
+    kept: NDArray[np.intp]
     nominal: float
 
-    @property
-    def number(self) -> int:
-        """Number of equations."""
-        return len(range(*self.kept.indices(self.readings.shape[1])))
-
-    def equations(self, bases: tuple[Callable[[Array], Array], Callable[[Array], Array]]) -> tuple[Array, Array]:
+    def equations(self, bases: tuple[Callable[[Array], Array], Callable[[Array], Array]]) -> tuple[Array, Array, int]:
         """Rows and right-hand sides [m] of the equations, after the projection, shapes (number, n + m + 1) and
-        (number,): their unknowns are the coefficients of both error curves, relative to the error at rest, and the
-        scale of laser 2 relative to that of laser 1.
+        (number,), and the number of columns that were projected out. The unknowns are the coefficients of both error
+        curves, relative to the error at rest, and the scale of laser 2 relative to that of laser 1.
 
         `bases` compute the basis functions of the curves at readings of shape (k,): shapes (n, k) and (m, k).
         """
@@ -74,18 +74,25 @@ class StoreyMotion:
         steady: Array = own[0]
         # the coefficients of the equation are linear in it, so that no iteration is needed
         fitted = np.linalg.lstsq(own[1:].T, -steady, rcond=None)[0]
-        q, p = float(fitted[0]), float(fitted[1])
+        q, p, b, c = (float(each) for each in fitted[:4])
+        drift, s = self.readings[1] - self.readings[0], self._s
+        stiffer, one = 2.0 * b * drift + 3.0 * c * drift**2, np.ones(s.size)
+        lower, upper = 1.0 + q * s, 1.0 + q * s + p * s**2
         first, second = (base(each) - base(np.zeros(1)) for base, each in zip(bases, self.readings, strict=True))
-        s = self._s
-        lower, upper = -(1.0 + q * s), 1.0 + q * s + p * s**2
-        curves = (self._filtered(first, lower), self._filtered(second, upper), self._filtered(self.readings[1:], upper))
-        rows, values = np.concatenate(curves).T, steady + q * own[1] + p * own[2]
+        rows = np.concatenate(
+            (
+                -self._filtered(first, lower) - self._filtered(stiffer * first, one),
+                self._filtered(second, upper) + self._filtered(stiffer * second, one),
+                self._filtered(self.readings[1:], upper) + self._filtered(stiffer * self.readings[1:], one),
+            )
+        ).T
+        values = steady + q * own[1] + p * own[2]
         across = np.linalg.qr(np.concatenate((own[1:], self._delays(upper))).T).Q
-        return rows - across @ (across.T @ rows), values - across @ (across.T @ values)
+        return rows - across @ (across.T @ rows), values - across @ (across.T @ values), across.shape[1]
 
     def _own(self) -> Array:
-        """Filtered drift, its rate, and acceleration of the second storey, and what else may be in a residual, shape
-        (terms, number), each of the latter with a rms of 1.
+        """Filtered drift, its rate, acceleration of the second storey, square and cube of the drift, and what else may
+        be in a residual, shape (terms, number).
         """
         drift = self.readings[1] - self.readings[0]
         s, one = self._s, np.ones(self._size // 2 + 1)
@@ -95,15 +102,14 @@ class StoreyMotion:
             table = self._filtered(self.acceleration[None], one)
             bending = bending + table
             others.append(self.acceleration)
-        more = self._filtered(np.array(others), one)
-        more /= np.maximum(np.sqrt(np.mean(more**2, axis=1, keepdims=True)), np.finfo(np.float64).tiny)
-        return np.concatenate((self._filtered(drift[None], one), self._filtered(drift[None], s), bending, more))
+        terms = self._filtered(drift[None], one), self._filtered(drift[None], s), bending
+        return np.concatenate((*terms, self._filtered(np.array(others), one)))
 
     def _delays(self, upper: NDArray[np.complex128]) -> Array:
         """Effect of a delay between the lasers at each of its knots, shape (knots, number)."""
         speed = self._filtered(self.readings[1:], upper * self._s)
-        time = np.arange(self.number) * (KEPT / self.rate)
-        knots = np.arange(0.0, time[-1] + KNOTS, KNOTS)
+        time = self.kept / self.rate
+        knots = np.arange(time[0], time[-1] + KNOTS, KNOTS)
         return np.maximum(1.0 - np.abs(time - knots[:, None]) / KNOTS, 0.0) * speed
 
     @property
@@ -142,15 +148,30 @@ def storey_motion(signals: Array, frame: LinearFrame, sample_rate: float) -> Sto
     margin = _edge(nominal, sample_rate)
     begin, end = max(during.start - margin, 0), min(during.stop + margin, len(signals))
     columns = [LASER_1, LASER_2] if frame.grounded else [LASER_1, LASER_2, ACCELERATION]
+    known: NDArray[np.bool_] = np.isfinite(signals[begin:end, columns])
+    if not (known.mean(axis=0) >= COMPLETE).all():
+        return None
     every = max(int(sample_rate / (INNER * BAND)), 1)
     values = _slower([_complete(signals[begin:end, column]) for column in columns], every, sample_rate)
     rate, n = sample_rate / every, values.shape[1]
     edge = _edge(nominal, rate)
     first = max(ceil((during.start - begin) / every), edge)
     last = min((during.stop - begin) // every, n - edge)
-    if (last - first) / rate < shortest(frame):
+    bridged = ~_near_gaps(np.asarray(known.all(axis=1)), nominal, sample_rate)
+    kept = first + KEPT * np.flatnonzero(bridged[first * every : last * every : KEPT * every])
+    if kept.size * KEPT / rate < shortest(frame):
         return None
-    return StoreyMotion(rate, values[:2], None if frame.grounded else values[2], slice(first, last, KEPT), nominal)
+    return StoreyMotion(rate, values[:2], None if frame.grounded else values[2], kept, nominal)
+
+
+def _near_gaps(known: NDArray[np.bool_], nominal: float, rate: float) -> NDArray[np.bool_]:
+    """Mask of the samples at `rate` [Hz] in and near gaps of the `known` ones, shape (n,), that are not bridged."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([True], known, [True])).astype(np.int8)))
+    near, margin = np.zeros(known.size, dtype=np.bool_), ceil(AROUND * sqrt(nominal) * rate)
+    for begin, end in zip(edges[::2], edges[1::2], strict=True):
+        if end - begin > LONGEST * rate:
+            near[max(begin - margin, 0) : end + margin] = True
+    return near
 
 
 def _edge(nominal: float, rate: float) -> int:
@@ -165,7 +186,7 @@ def _complete(values: Array) -> Array:
 
 
 def _slower(values: Sequence[Array], every: int, sample_rate: float) -> Array:
-    """Every `every`-th of the smoothed `values`, shape (k, n // every); the band of the equations is unchanged."""
+    """Every `every`-th of the smoothed `values`, shape (k, ceil(n / every)); the band of the equations is unchanged."""
     n = values[0].size
     pad = ceil(sample_rate / BAND)
     padded = np.pad(np.array(values), ((0, 0), (pad, pad)), mode="edge")

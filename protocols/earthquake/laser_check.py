@@ -123,10 +123,11 @@ class LaserCheck:
 def advice(
     parameters: EarthquakeParameters, configuration: BenchConfiguration, points: Sequence[Mapping[str, Any]]
 ) -> str:
-    """Sentence that recommends the check; empty if it was requested, if the lasers are calibrated, or if their
-    linearity does not dominate the uncertainty of alpha_2 at any of the `points`, which have the fields of the results.
+    """Sentence that recommends the check; empty if it was requested, if the errors of the lasers are found in the
+    motion or calibrated, or if their linearity does not dominate the uncertainty of alpha_2 at any of the `points`,
+    which have the fields of the results.
     """
-    if parameters.laser_check or configuration.calibrated is not None:
+    if parameters.laser_check or parameters.laser_block or configuration.calibrated is not None:
         return ""
     measured = [row for row in points if row["alpha_2_uncertainty"] and row.get("uncertainty_parts")]
     number = sum(

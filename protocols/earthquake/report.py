@@ -78,7 +78,9 @@ def seismic_sections(campaign: Campaign) -> list[Section]:
 def _advice(campaign: Campaign, points: Sequence[Mapping[str, Any]]) -> list[Part]:
     if campaign.configuration is None:
         return []
-    found = advice(validated(EarthquakeParameters, campaign.parameters), campaign.configuration, points)
+    # files of earlier versions have no such parameter
+    stored = {"laser_block": None} | dict(campaign.parameters)
+    found = advice(validated(EarthquakeParameters, stored), campaign.configuration, points)
     return [typeset(found)] if found else []
 
 

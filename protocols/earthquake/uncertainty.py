@@ -98,7 +98,7 @@ def compare(
     checked: SensorUncertainty | None = None,
 ) -> Compared:
     """Compare the gains measured in two tests, bare and coupled, with the predicted gains of `n` draws; `checked` are
-    the sensors of the `configuration` with the check of the lasers, if there was one.
+    the sensors of the `configuration` with what is known of the lasers, if anything.
     """
     sensors = configuration.sensors if checked is None else checked
     drifts, firsts = (bare.drift, coupled.drift), (bare.u1, coupled.u1)
@@ -200,8 +200,8 @@ def drift_errors(
 ) -> dict[str, Array]:
     """Drawn relative errors of the drift peaks, bare and coupled, by contribution, shape (2, n) each.
 
-    For checked or calibrated lasers they include the choice of the largest peak among several of almost the same size,
-    whose linearity errors differ. Without either, the most unfavourable shape covers it.
+    For lasers whose errors were found, checked or calibrated they include the choice of the largest peak among several
+    of almost the same size, whose linearity errors differ. Otherwise, the most unfavourable shape covers it.
     """
     random = np.random.default_rng(seed)
     noise = np.array([_noise(peak, random, n) for peak in peaks])

@@ -125,8 +125,9 @@ def test_exact_readings_leave_nothing_in_the_equations(frame: LinearFrame, groun
     for moved in (MOTIONS[0], motion(3, softer=0.93)):
         seen = storey_motion(signals(moved, (none, none), grounded=grounded), frame, RATE)
         assert seen is not None
-        rows, values = seen.equations((np.atleast_2d, np.atleast_2d))
-        assert rows.shape == (seen.number, 3)
+        rows, values, removed = seen.equations((np.atleast_2d, np.atleast_2d))
+        assert rows.shape == (seen.kept.size, 3)
+        assert 10 < removed < seen.kept.size // 10
         assert np.sqrt(np.mean(values**2)) < 1e-6
 
 
@@ -152,19 +153,22 @@ def test_the_errors_of_a_ratio_become_small_and_are_as_large_as_stated(
     assert np.abs(off).max() < 3.5
 
 
-@pytest.mark.parametrize(("cubic", "friction"), [(40.0, 0.0), (0.0, 0.01), (40.0, 0.01)])
+@pytest.mark.parametrize(("cubic", "friction"), [(40.0, 0.0), (100.0, 0.0), (0.0, 0.01), (40.0, 0.01)])
 def test_stiffness_that_is_not_constant_and_friction_cause_no_false_errors(cubic: float, friction: float) -> None:
-    """Up to 16 % more stiffness at the largest drift, and a friction of 1 % of the largest force."""
-    tests = [motion(seed, cubic=cubic, friction=friction, stroke=stroke) for seed, stroke in ((1, 0.03), (2, 0.02))]
-    errors = curve(1.5, 1.0), curve(1.2, 2.0)
-    seen = [signals(each, errors, 1.5e-5, k) for k, each in enumerate(tests)]
-    found = found_in(*seen)
-    assert found is not None
-    exact = [signals(each, errors) for each in tests]
-    _, left, stated = peaks(found, list(zip(tests, exact, strict=True)))
-    # the linearity errors are up to 0.5 % of these drifts
-    assert stated < 5e-4
-    assert abs(left) < 3.0 * stated
+    """Up to 16 % and 80 % more stiffness at the largest drift, and a friction of 1 % of the largest force."""
+    off, sizes = [], []
+    for number in range(3):
+        tests = [motion(2 * number + k, cubic=cubic, friction=friction, stroke=0.03 - 0.01 * k) for k in (1, 2)]
+        phases = np.random.default_rng([number, 5]).uniform(0.0, tau, 2)
+        errors = curve(1.5, phases[0]), curve(1.2, phases[1])
+        found = found_in(*(signals(each, errors, 1.5e-5, k) for k, each in enumerate(tests)))
+        assert found is not None
+        _, left, stated = peaks(found, [(each, signals(each, errors)) for each in tests])
+        off.append(left / stated)
+        sizes.append(stated)
+    # the linearity errors are up to 0.5 % of these drifts; friction is larger noise, which widens the interval
+    assert max(sizes) < (1e-3 if friction else 2e-4)
+    assert np.sqrt(np.mean(np.square(off))) < 1.3
 
 
 def test_a_delay_that_wanders_between_the_lasers_causes_no_false_errors() -> None:
@@ -227,6 +231,25 @@ def test_a_laser_that_errs_more_than_its_data_sheet_allows_is_named() -> None:
         remarks = found.rough(found.shapes([]))
         assert len(remarks) == named
         assert all("laser_2 is 0." in each and "its data sheet allows 0.16 mm" in each for each in remarks)
+
+
+def test_near_a_long_gap_there_are_no_equations() -> None:
+    errors = curve(1.5, 1.0), curve(1.2, 2.0)
+    seen = [signals(each, errors, 1.5e-5, k) for k, each in enumerate(MOTIONS)]
+    lost = seen[0].copy()
+    begin = round(6.0 * RATE)
+    lost[begin : begin + round(0.25 * RATE), [LASER_1, DRIFT]] = np.nan
+    whole, found = found_in(*seen), found_in(lost, seen[1])
+    assert whole is not None
+    assert found is not None
+    assert found.noise < 1.2 * whole.noise
+    exact = [(each, signals(each, errors)) for each in MOTIONS]
+    _, left, stated = peaks(found, exact)
+    assert abs(left) < 3.0 * stated < 5e-4
+    # an accelerometer that is lost, for lasers on the table
+    table = signals(MOTIONS[0], errors, grounded=False)
+    table[:, ACCELERATION] = np.nan
+    assert found_in(table, frame=TABLE) is None
 
 
 def test_nothing_is_corrected_at_rest_and_a_missing_reading_stays_missing() -> None:
