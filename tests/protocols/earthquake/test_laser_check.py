@@ -56,11 +56,15 @@ def test_the_check_is_recommended_where_the_linearity_of_the_lasers_dominates() 
         return {"alpha_2_uncertainty": 0.02, "uncertainty_parts": json.dumps({LINEARITY: linearity, CHOICE: 0.001})}
 
     points = [point(0.0099), point(0.005), point(0.008), {"alpha_2_uncertainty": None, "uncertainty_parts": ""}]
-    assert "2 of 3" in advice(EarthquakeParameters(), CONFIGURATION, points)
+    plain = EarthquakeParameters(laser_block=0.0)
+    assert "2 of 3" in advice(plain, CONFIGURATION, points)
+    assert advice(EarthquakeParameters(laser_block=None), CONFIGURATION, points) == advice(plain, CONFIGURATION, points)
     calibrated = CONFIGURATION.model_copy(update={"calibrated": calibration(-0.05, 0.05)})
-    assert advice(EarthquakeParameters(), CONFIGURATION, points[1:2]) == ""
-    assert advice(EarthquakeParameters(laser_check=True), CONFIGURATION, points) == ""
-    assert advice(EarthquakeParameters(), calibrated, points) == ""
+    assert advice(plain, CONFIGURATION, points[1:2]) == ""
+    assert advice(EarthquakeParameters(laser_check=True, laser_block=0.0), CONFIGURATION, points) == ""
+    assert advice(plain, calibrated, points) == ""
+    # they are found in the motion
+    assert advice(EarthquakeParameters(), CONFIGURATION, points) == ""
 
 
 def test_the_sine_uses_most_of_a_limit_and_exceeds_none() -> None:
