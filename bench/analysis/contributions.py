@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from math import hypot, sqrt
 from typing import Literal
 
-from bench.analysis.sensor_accuracy import LINEARITY, SCALES, STEPS, TIMING
+from bench.analysis.sensor_uncertainty import LINEARITY, SCALES, STEPS, TIMING
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from bench.analysis.remaining_transient import remaining_transient
 from bench.analysis.rounding import FittedPeak
 from bench.analysis.rounding_correction import MODEL, rounding
 from bench.analysis.sensor_accuracy import SensorAccuracy as SensorAccuracy
-from bench.analysis.sensor_accuracy import SensorUncertainty
+from bench.analysis.sensor_uncertainty import SensorUncertainty
 from bench.analysis.signals import ACCELERATION, DRIFT, LASER_1, LASER_2, U1
 from bench.analysis.uncertainty import COVERAGE as COVERAGE
 from bench.analysis.uncertainty import NOISE, Budget, combined_freedom

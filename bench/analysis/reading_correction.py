@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.analysis.linearity import expected_errors
-from bench.analysis.sensor_accuracy import SensorUncertainty
+from bench.analysis.sensor_uncertainty import SensorUncertainty
 from bench.analysis.signals import DRIFT, LASER_1, LASER_2, U1
 
 Array = NDArray[np.float64]

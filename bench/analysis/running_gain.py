@@ -7,7 +7,7 @@ import numpy as np
 from bench.analysis.draws import SharedDraws
 from bench.analysis.gain import DRAWS, SEED, Gain, SteadyPeak, gain
 from bench.analysis.peak_readings import PeakReadings, Shapes
-from bench.analysis.sensor_accuracy import SensorUncertainty
+from bench.analysis.sensor_uncertainty import SensorUncertainty
 
 CHANGED = 0.003
 """Change of a reading, relative to the swing of its laser, below which a running gain keeps the lasers' errors."""

@@ -5,7 +5,8 @@ from typing import Any, Literal, cast
 from pydantic import SerializeAsAny, ValidationInfo, field_validator, model_validator
 
 from bench.analysis.laser_calibration import LaserCalibration
-from bench.analysis.sensor_accuracy import SensorAccuracy, SensorUncertainty
+from bench.analysis.sensor_accuracy import SensorAccuracy
+from bench.analysis.sensor_uncertainty import SensorUncertainty
 from bench.config.backend import RigSettings, load_backend
 from bench.config.sections import Acquisition, Simulation, Twin
 from bench.config.validation import validated

@@ -21,7 +21,7 @@ from bench.analysis.cycles import CycleAnalyser
 from bench.analysis.error_curve import Checks
 from bench.analysis.gain import steady_peak
 from bench.analysis.reading_correction import ReadingCorrection
-from bench.analysis.sensor_accuracy import LINEARITY
+from bench.analysis.sensor_uncertainty import LINEARITY
 from bench.analysis.table_motion import table_motion
 from bench.analysis.uncertainty import COVERAGE
 from bench.config.model import BenchConfiguration

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from bench.analysis.draws import Draws
 from bench.analysis.peak_readings import PeakReadings
-from bench.analysis.sensor_accuracy import SensorUncertainty
+from bench.analysis.sensor_uncertainty import SensorUncertainty
 from bench.analysis.uncertainty import COVERAGE, NOISE, Budget
 from bench.config.model import BenchConfiguration
 from protocols.earthquake.draws import Predicted, predict_draws

@@ -7,7 +7,7 @@ from typing import Any
 
 from bench.analysis.free_motion import FreeMotion, Rate
 from bench.analysis.gain import Gain, SteadyPeak, gain, without_rounding
-from bench.analysis.sensor_accuracy import SensorUncertainty
+from bench.analysis.sensor_uncertainty import SensorUncertainty
 from bench.analysis.uncertainty import plus_minus
 from bench.prediction.bands import expanded_uncertainty
 from protocols.common.sine.settling import Held, Settled

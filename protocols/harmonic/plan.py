@@ -11,7 +11,7 @@ from collections.abc import Generator, Mapping, Sequence
 from dataclasses import replace
 
 from bench.analysis.running_gain import RunningGain, shared_draws
-from bench.analysis.sensor_accuracy import SensorUncertainty
+from bench.analysis.sensor_uncertainty import SensorUncertainty
 from bench.config.model import BenchConfiguration
 from bench.control.cycle_identification import Control, IdentifyingStabiliser, load_solvers
 from bench.control.oscillator import DriveCalibration, Segment

@@ -6,7 +6,7 @@ from math import hypot
 from bench.analysis.cycles import Cycle
 from bench.analysis.gain import TRANSIENT, SteadyPeak, steady_peak
 from bench.analysis.running_gain import RunningGain
-from bench.analysis.sensor_accuracy import STEPS
+from bench.analysis.sensor_uncertainty import STEPS
 from bench.engine.steps import Outcome, Publish, Step
 from bench.live_values import Estimate
 from protocols.common.sine.pace import Pace

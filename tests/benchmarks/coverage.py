@@ -25,7 +25,7 @@ from bench.analysis.cycles import Cycle
 from bench.analysis.gain import steady_peak
 from bench.analysis.laser_calibration import LaserCalibration
 from bench.analysis.linearity import LinearFrame
-from bench.analysis.sensor_accuracy import SensorUncertainty
+from bench.analysis.sensor_uncertainty import SensorUncertainty
 from bench.analysis.steady import Steadiness, SteadyDetector
 from bench.config.model import BenchConfiguration
 from protocols.common.sine.settling import INTERVAL, JUDGED, LASERS, SHORTEST, TRANSIENT, Settled, checked

@@ -12,7 +12,7 @@ import numpy as np
 from bench.accelerograms.reference import RecordReference
 from bench.analysis.linearity import LinearFrame
 from bench.analysis.reading_correction import ReadingCorrection
-from bench.analysis.sensor_accuracy import SensorUncertainty
+from bench.analysis.sensor_uncertainty import SensorUncertainty
 from bench.analysis.table_motion import table_motion, with_final_rest
 from bench.config.model import BenchConfiguration
 from protocols.earthquake.laser_check import LaserCheck, laser_check

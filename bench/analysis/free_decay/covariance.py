@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from bench.analysis.free_decay.fit import OFFSETS, Fit
 from bench.analysis.free_decay.response import quantities, slopes
-from bench.analysis.sensor_accuracy import SensorUncertainty
+from bench.analysis.sensor_uncertainty import SensorUncertainty
 
 Array = NDArray[np.float64]
 

@@ -11,7 +11,7 @@ from bench.analysis.free_decay.damping import DampingCourse, damping_courses
 from bench.analysis.free_decay.fit import NOISE, OFFSETS, Fit, fit_from_scratch
 from bench.analysis.free_decay.response import OMEGA1, XI1, quantities
 from bench.analysis.free_decay.stretch import Stretch, Unusable, stretch_of
-from bench.analysis.sensor_accuracy import SensorUncertainty
+from bench.analysis.sensor_uncertainty import SensorUncertainty
 from bench.analysis.signals import DISPLACEMENT, LASER_1, LASER_2
 from bench.analysis.uncertainty import enlarged, mean_of_repeats
 

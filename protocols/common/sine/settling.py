@@ -9,7 +9,7 @@ from bench.analysis.cycles import Cycle
 from bench.analysis.free_motion import KEPT, FreeMotion, Rate, free_motion, orbit_peak
 from bench.analysis.gain import SensorAccuracy, SteadyPeak, steady_peak
 from bench.analysis.linearity import LinearFrame
-from bench.analysis.sensor_accuracy import SensorUncertainty
+from bench.analysis.sensor_uncertainty import SensorUncertainty
 from bench.analysis.signals import ACCELERATION, DISPLACEMENT, LASER_1, LASER_2
 from bench.analysis.steady import WINDOW, Steadiness, SteadyDetector
 from bench.config.model import BenchConfiguration

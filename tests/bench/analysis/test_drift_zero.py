@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from bench.analysis.drift_zero import PLACES, drift_zero
 from bench.analysis.linearity import LinearFrame
-from bench.analysis.sensor_accuracy import SensorAccuracy, SensorUncertainty
+from bench.analysis.sensor_accuracy import SensorAccuracy
+from bench.analysis.sensor_uncertainty import SensorUncertainty
 from bench.analysis.signals import DISPLACEMENT, DRIFT, LASER_1, LASER_2
 from protocols.earthquake.observation import observe
 from protocols.earthquake.uncertainty import with_better_zero

@@ -15,7 +15,8 @@ from bench.analysis.free_decay.decay import Decay, Setting, combine, pulsed_deca
 from bench.analysis.free_decay.fit import fit_from_scratch
 from bench.analysis.free_decay.response import K1, K2, OMEGA1, XI1, XI2, Constants, quantities, response, slopes
 from bench.analysis.free_decay.stretch import Unusable, stretch_of
-from bench.analysis.sensor_accuracy import SensorAccuracy, SensorUncertainty
+from bench.analysis.sensor_accuracy import SensorAccuracy
+from bench.analysis.sensor_uncertainty import SensorUncertainty
 from sim.specimen import Frame
 from tests.bench.calibrated import calibration
 

@@ -16,7 +16,7 @@ from bench.analysis.laser_calibration import LaserCalibration
 from bench.analysis.linearity import LinearFrame
 from bench.analysis.peak_readings import PeakReadings
 from bench.analysis.running_gain import shared_draws
-from bench.analysis.sensor_accuracy import SCALES, STEPS, SensorUncertainty
+from bench.analysis.sensor_uncertainty import SCALES, STEPS, SensorUncertainty
 from bench.analysis.signals import ACCELERATION, DRIFT, LASER_2
 from bench.analysis.unsteady_peaks import unsteady_peaks
 from sim.specimen import Specimen

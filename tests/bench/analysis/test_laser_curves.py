@@ -14,7 +14,8 @@ from bench.analysis.draws import Draws
 from bench.analysis.laser_curves import LaserCurves, laser_curves
 from bench.analysis.linearity import Effect, LinearFrame
 from bench.analysis.peak_readings import PeakReadings
-from bench.analysis.sensor_accuracy import LINEARITY, SCALES, SensorAccuracy, SensorUncertainty
+from bench.analysis.sensor_accuracy import SensorAccuracy
+from bench.analysis.sensor_uncertainty import LINEARITY, SCALES, SensorUncertainty
 from bench.analysis.signals import ACCELERATION, DISPLACEMENT, DRIFT, LASER_1, LASER_2, SIGNALS, U1
 from bench.analysis.storey_equations import storey_motion
 from sim.specimen import Specimen

@@ -9,7 +9,8 @@ from numpy.polynomial import chebyshev
 
 from bench.analysis.error_curve import Checks, Harmonics
 from bench.analysis.reading_correction import ReadingCorrection
-from bench.analysis.sensor_accuracy import SensorAccuracy, SensorUncertainty
+from bench.analysis.sensor_accuracy import SensorAccuracy
+from bench.analysis.sensor_uncertainty import SensorUncertainty
 from bench.analysis.signals import ACCELERATION, DISPLACEMENT, DRIFT, LASER_1, LASER_2, SIGNALS, U1
 from tests.bench.calibrated import calibration
 

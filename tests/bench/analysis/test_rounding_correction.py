@@ -10,7 +10,7 @@ from numpy.random import SeedSequence
 from bench.analysis.cycles import Cycle, CycleAnalyser
 from bench.analysis.gain import SensorAccuracy, steady_peak
 from bench.analysis.rounding_correction import FEWEST, MODEL, Rounding, rounding
-from bench.analysis.sensor_accuracy import SensorUncertainty
+from bench.analysis.sensor_uncertainty import SensorUncertainty
 from bench.analysis.signals import DRIFT, LASER_1, SIGNALS
 from bench.analysis.steady import Steadiness
 from protocols.common.sine.settling import Settled

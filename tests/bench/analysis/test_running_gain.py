@@ -6,13 +6,14 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 
-from bench.analysis import error_curve, remaining_transient, rounding, sensor_accuracy
+from bench.analysis import error_curve, remaining_transient, rounding, sensor_uncertainty
 from bench.analysis.error_curve import Harmonics
 from bench.analysis.gain import SteadyPeak, gain
 from bench.analysis.peak_readings import PeakReadings
 from bench.analysis.rounding import FittedPeak
 from bench.analysis.running_gain import CHANGED, RunningGain, shared_draws
-from bench.analysis.sensor_accuracy import SensorAccuracy, SensorUncertainty
+from bench.analysis.sensor_accuracy import SensorAccuracy
+from bench.analysis.sensor_uncertainty import SensorUncertainty
 
 SENSORS = SensorUncertainty(SensorAccuracy(), (0.2, 0.2))
 PHASES = np.arange(32) * (2.0 * np.pi / 32)
@@ -53,7 +54,7 @@ BARE = checked(peak(0.02), 1.5)
 def test_a_steady_motion_evaluates_the_linearity_once_and_a_settling_one_at_every_change() -> None:
     drifts = [0.01 * (1.0 + 0.2 * 0.8**k) for k in range(40)]
     running = RunningGain(BARE, SENSORS, SHARED)
-    with patch.object(sensor_accuracy, "linearity_errors", wraps=sensor_accuracy.linearity_errors) as evaluated:
+    with patch.object(sensor_uncertainty, "linearity_errors", wraps=sensor_uncertainty.linearity_errors) as evaluated:
         for drift in drifts[20:]:
             running.of(peak(drift))
         assert evaluated.call_count == 2, "both lasers once"
@@ -72,7 +73,7 @@ def test_the_uncertainty_of_a_changed_motion_is_that_of_the_result_to_a_hundredt
     running = RunningGain(bare, SENSORS, SHARED)
     running.of(peak(drift))
     changed = peak(drift * (1.0 + change), lag=0.2 * change)
-    with patch.object(sensor_accuracy, "linearity_errors") as evaluated:
+    with patch.object(sensor_uncertainty, "linearity_errors") as evaluated:
         found = running.of(changed)
     assert not evaluated.called
     expected = gain(changed, bare, SENSORS)

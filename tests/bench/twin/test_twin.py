@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from bench.analysis.sensor_accuracy import SensorAccuracy, SensorUncertainty
+from bench.analysis.sensor_accuracy import SensorAccuracy
+from bench.analysis.sensor_uncertainty import SensorUncertainty
 from bench.config.sections import Twin
 from bench.datafile.reader import open_datafile
 from bench.engine.steps import OperatorAction, Plan

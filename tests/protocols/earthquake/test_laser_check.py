@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from bench.analysis.reading_correction import ReadingCorrection
-from bench.analysis.sensor_accuracy import LINEARITY, STEPS
+from bench.analysis.sensor_uncertainty import LINEARITY, STEPS
 from bench.analysis.signals import ACCELERATION, DRIFT, LASER_1, LASER_2, SIGNALS, U1
 from bench.app.cli.main import main
 from bench.config.model import BenchConfiguration

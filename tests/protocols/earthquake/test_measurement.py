@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from bench.analysis.gain import SensorAccuracy
-from bench.analysis.sensor_accuracy import LINEARITY, SensorUncertainty
+from bench.analysis.sensor_uncertainty import LINEARITY, SensorUncertainty
 from bench.analysis.signals import U1
 from bench.analysis.transient_base import BaseMotion
 from bench.analysis.transient_peak import TransientPeak

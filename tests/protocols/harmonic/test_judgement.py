@@ -9,7 +9,7 @@ import pytest
 from bench.analysis.free_motion import FreeMotion, Rate
 from bench.analysis.gain import SensorAccuracy, SteadyPeak
 from bench.analysis.peak_readings import PeakReadings
-from bench.analysis.sensor_accuracy import SensorUncertainty
+from bench.analysis.sensor_uncertainty import SensorUncertainty
 from bench.analysis.steady import Steadiness
 from bench.analysis.unsteady_peaks import UnsteadyPeaks
 from protocols.common.sine.settling import Settled

@@ -5,7 +5,7 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 
-from bench.analysis import sensor_accuracy
+from bench.analysis import sensor_uncertainty
 from bench.engine.steps import Publish
 from bench.live_values import Estimate
 from protocols.harmonic import judgement, plan
@@ -34,7 +34,7 @@ def test_a_steady_point_evaluates_the_linearity_for_its_first_check_and_for_its_
 ) -> None:
     script = _script(predicted, 0.0)
     with (
-        patch.object(sensor_accuracy, "linearity_errors", wraps=sensor_accuracy.linearity_errors) as evaluated,
+        patch.object(sensor_uncertainty, "linearity_errors", wraps=sensor_uncertainty.linearity_errors) as evaluated,
         patch.object(plan, "predict_gain", wraps=predict_gain) as followed,
     ):
         (point,) = script.run()

@@ -4,7 +4,8 @@ from dataclasses import replace
 
 from bench.analysis.gain import SteadyPeak, steady_peak
 from bench.analysis.running_gain import RunningGain, shared_draws
-from bench.analysis.sensor_accuracy import SensorAccuracy, SensorUncertainty
+from bench.analysis.sensor_accuracy import SensorAccuracy
+from bench.analysis.sensor_uncertainty import SensorUncertainty
 from protocols.common.sine.pace import Pace
 from protocols.harmonic.running import NEGLIGIBLE, SHARE, RunningPoint
 from tests.bench.calibrated import calibration

@@ -13,7 +13,8 @@ from bench.analysis.cycles import CycleAnalyser
 from bench.analysis.draws import Draws
 from bench.analysis.laser_calibration import LaserCalibration, LaserCurve
 from bench.analysis.peak_readings import PeakReadings
-from bench.analysis.sensor_accuracy import LINEARITY, SCALES, SensorAccuracy, SensorUncertainty
+from bench.analysis.sensor_accuracy import SensorAccuracy
+from bench.analysis.sensor_uncertainty import LINEARITY, SCALES, SensorUncertainty
 from bench.analysis.signals import ACCELERATION, DISPLACEMENT, DRIFT, LASER_1, LASER_2, SIGNALS, U1, SignalMap
 from bench.app.catalogue import load_protocol
 from bench.app.cli.main import main
