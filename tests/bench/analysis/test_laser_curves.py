@@ -1,6 +1,6 @@
 """Error curves of the lasers from the motion of the second storey, on motions that another solver made."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from math import tau
 
@@ -44,29 +44,36 @@ class Motion:
         return self.second - self.first
 
 
-def motion(seed: int, softer: float = 1.0, cubic: float = 0.0, friction: float = 0.0, stroke: float = 0.03) -> Motion:
-    """The second storey above a first one that something moves for 16 s: any table, and any force on it.
+def motions(
+    strokes: Mapping[int, float], softer: float = 1.0, cubic: float = 0.0, friction: float = 0.0
+) -> list[Motion]:
+    """The second storey above a first one that something moves for 16 s by up to `strokes` [m], one for each seed: any
+    table, and any force on it.
 
     The upper columns have `softer` times the nominal stiffness, which increases by `cubic` times the square of the
-    drift, and a friction that is this share of the largest elastic force.
+    drift, and a friction that is this share of the elastic force at a drift of 50 mm.
     """
-    random = np.random.default_rng(seed)
     rise = np.clip(np.minimum(TIME - 2.0, 18.0 - TIME), 0.0, 1.0)
-    lowest, highest = 0.8, 5.0
-    band = signal.butter(4, (lowest, highest), "bandpass", fs=RATE, output="sos")
-    first, table = (signal.sosfiltfilt(band, random.standard_normal(TIME.size)) for _ in range(2))
-    first, table = (each * rise / np.abs(each).max() for each in (first, table))
-    first, table = stroke * first, 0.6 * stroke * table
-    below, k, yielding = CubicSpline(TIME, first), softer * K, friction * K * 0.05
+    band = signal.butter(4, (0.8, 5.0), "bandpass", fs=RATE, output="sos")
+    firsts, tables = [], []
+    for seed, stroke in strokes.items():
+        random = np.random.default_rng(seed)
+        first, table = (signal.sosfiltfilt(band, random.standard_normal(TIME.size)) for _ in range(2))
+        firsts.append(stroke * first * rise / np.abs(first * rise).max())
+        tables.append(0.6 * stroke * table * rise / np.abs(table * rise).max())
+    below, n = CubicSpline(TIME, np.transpose(firsts)), len(firsts)
+    moving, k, yielding = below.derivative(), softer * K, friction * K * 0.05
 
-    def rate(t: float, y: Array) -> list[float]:
-        drift, speed = y[0] - below(t), y[1] - below(t, 1)
+    def rate(t: float, y: Array) -> Array:
+        drift, speed = y[:n] - below(t), y[n:] - moving(t)
         force = k * (1.0 + cubic * drift**2) * drift + C * speed + yielding * np.tanh(speed / 1e-3)
-        return [y[1], -force]
+        return np.concatenate((y[n:], -force))
 
-    found = solve_ivp(rate, (0.0, TIME[-1]), [0.0, 0.0], t_eval=TIME, rtol=1e-9, atol=1e-10, max_step=0.05)
-    acceleration = CubicSpline(TIME, table)(TIME, 2)
-    return Motion(table, first, found.y[0], acceleration)
+    found = solve_ivp(rate, (0.0, TIME[-1]), np.zeros(2 * n), t_eval=TIME, rtol=1e-9, atol=1e-10, max_step=0.05)
+    return [
+        Motion(table, first, second, CubicSpline(TIME, table)(TIME, 2))
+        for table, first, second in zip(tables, firsts, found.y[:n], strict=True)
+    ]
 
 
 def curve(waves: float, phase: float, slope: float = 0.0) -> Callable[[Array], Array]:
@@ -116,14 +123,14 @@ def peaks(found: LaserCurves, tests: list[tuple[Motion, Array]]) -> tuple[float,
     return raw[1] - raw[0], corrected[1] - corrected[0], stated
 
 
-MOTIONS = [motion(1), motion(2, stroke=0.02)]
+MOTIONS = motions({1: 0.03, 2: 0.02})
 
 
 @pytest.mark.parametrize(("frame", "grounded"), [(GROUND, True), (TABLE, False)])
 def test_exact_readings_leave_nothing_in_the_equations(frame: LinearFrame, grounded: bool) -> None:
     """Also with another stiffness than the nominal one, which is fitted."""
     none = curve(0.0, 0.0)
-    for moved in (MOTIONS[0], motion(3, softer=0.93)):
+    for moved in (MOTIONS[0], *motions({3: 0.03}, softer=0.93)):
         seen = storey_motion(signals(moved, (none, none), grounded=grounded), frame, RATE)
         assert seen is not None
         rows, values, removed = seen.equations((np.atleast_2d, np.atleast_2d))
@@ -154,12 +161,13 @@ def test_the_errors_of_a_ratio_become_small_and_are_as_large_as_stated(
     assert np.abs(off).max() < 3.5
 
 
-@pytest.mark.parametrize(("cubic", "friction"), [(40.0, 0.0), (100.0, 0.0), (0.0, 0.01), (40.0, 0.01)])
+@pytest.mark.parametrize(("cubic", "friction"), [(100.0, 0.0), (0.0, 0.01), (40.0, 0.01)])
 def test_stiffness_that_is_not_constant_and_friction_cause_no_false_errors(cubic: float, friction: float) -> None:
-    """Up to 16 % and 80 % more stiffness at the largest drift, and a friction of 1 % of the largest force."""
+    """16 to 69 % more stiffness at the largest drifts, of 40 to 83 mm, and a friction of 1 % of the force at 50 mm."""
     off, sizes = [], []
-    for number in range(3):
-        tests = [motion(2 * number + k, cubic=cubic, friction=friction, stroke=0.03 - 0.01 * k) for k in (1, 2)]
+    moved = motions({seed: 0.02 if seed % 2 else 0.015 for seed in range(1, 13)}, cubic=cubic, friction=friction)
+    for number in range(6):
+        tests = moved[2 * number :][:2]
         phases = np.random.default_rng([number, 5]).uniform(0.0, tau, 2)
         errors = curve(1.5, phases[0]), curve(1.2, phases[1])
         found = found_in(*(signals(each, errors, 1.5e-5, k) for k, each in enumerate(tests)))
@@ -168,8 +176,8 @@ def test_stiffness_that_is_not_constant_and_friction_cause_no_false_errors(cubic
         off.append(left / stated)
         sizes.append(stated)
     # the linearity errors are up to 0.5 % of these drifts; friction is larger noise, which widens the interval
-    assert max(sizes) < (1e-3 if friction else 2e-4)
-    assert np.sqrt(np.mean(np.square(off))) < 1.3
+    assert max(sizes) < (2e-3 if friction else 2e-4)
+    assert np.sqrt(np.mean(np.square(off))) < 1.5
 
 
 def test_a_delay_that_wanders_between_the_lasers_causes_no_false_errors() -> None:
