@@ -226,16 +226,15 @@ def _posterior(observed: _Observed, first: Array, second: Array) -> tuple[Array,
     likely = np.exp(CAUTION * (evidence - evidence.max()))
     likely = np.where(likely >= LIKELY, likely, 0.0)
     likely /= likely.sum()
-    size = rows.shape[1]
-    mean, second_moment, covariance = np.zeros(size), np.zeros((size, size)), np.zeros((size, size))
-    for one, other in zip(*np.nonzero(likely), strict=True):
-        across = np.linalg.solve(factors[one, other], np.hstack((crossed[0][one], crossed[1][other], rows[:, -1:])))
-        expected = across.T @ white[one, other]
-        weight = likely[one, other]
-        mean += weight * expected
-        second_moment += weight * np.outer(expected, expected)
-        covariance -= weight * (across.T @ across)
+    one, other = np.nonzero(likely)
+    weights, inverse = likely[one, other], np.linalg.inv(factors[one, other])
+    parts = inverse @ crossed[0][one], inverse @ crossed[1][other], inverse @ rows[:, -1:]
+    across = np.concatenate(parts, axis=2)
+    expected = np.einsum("pki,pk->pi", across, white[one, other])
+    mean = weights @ expected
+    reduced = (np.sqrt(weights)[:, None, None] * across).reshape(-1, rows.shape[1])
+    covariance = expected.T @ (weights[:, None] * expected) - np.outer(mean, mean) - reduced.T @ reduced
     covariance[:n, :n] += np.einsum("k,kij->ij", likely.sum(axis=1), first)
     covariance[n:-1, n:-1] += np.einsum("k,kij->ij", likely.sum(axis=0), second)
     covariance[-1, -1] += 1.0
-    return mean, covariance + second_moment - np.outer(mean, mean)
+    return mean, covariance
