@@ -32,10 +32,13 @@ RENAMED = {"predicted for the asked motion": "predicted for the requested motion
 WITH_PASSES = {"earthquake"}
 """Runs whose protocol declares the table of the passes of a replication, which every file had."""
 
-ADDED = {"check": ("--delay-tolerance", "0.0005")}
-"""What a command needs today. The first edition did not compare the delays of the table's two sensors. With so few
-samples and an amplifier of 20 Hz, the steps of the drive shift the acceleration by 0.35 ms more than half a sample,
-which the default tolerance does not allow."""
+ADDED = {"check": ("--delay-tolerance", "0.0005"), "earthquake": ("--laser-block", "0")}
+"""What a command needs today.
+
+The first edition did not compare the delays of the table's two sensors. With so few samples and an amplifier of 20 Hz,
+the steps of the drive shift the acceleration by 0.35 ms more than half a sample, which the default tolerance does not
+allow. Under records, it knew the errors of the lasers from their data sheet only.
+"""
 
 
 @dataclass(frozen=True)
