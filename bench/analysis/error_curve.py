@@ -20,6 +20,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from math import pi, sqrt
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -140,10 +141,17 @@ def posterior(checks: tuple[Harmonics, ...], limit: float, whole: float) -> Post
     factors = np.linalg.cholesky(prior(places, observed, places, observed, limit, whole, scale) + noise)
     whitening = np.asarray(np.linalg.inv(factors), dtype=np.float64)
     white = whitening @ measured
-    sizes = np.log(np.diagonal(factors, axis1=1, axis2=2)).sum(axis=1)
-    evidence = -0.5 * np.einsum("km,km->k", white, white) - sizes
-    likely = np.exp(CAUTION * (evidence - evidence.max()))
+    likely = likelihoods(factors, white)
     return Posterior(places, observed, whitening, white, likely / likely.sum(), scale)
+
+
+def likelihoods(factors: NDArray[np.floating[Any]], white: NDArray[np.floating[Any]]) -> Array:
+    """Weights of candidates relative to that of the likeliest, shape (...): for the triangular `factors` of the
+    covariances of what was measured, shape (..., m, m), and the `white` numbers that these make of it, shape (..., m).
+    """
+    sizes = np.log(np.diagonal(factors, axis1=-2, axis2=-1)).sum(axis=-1)
+    evidence = -0.5 * np.einsum("...m,...m->...", white, white) - sizes
+    return np.asarray(np.exp(CAUTION * (evidence - evidence.max())), dtype=np.float64)
 
 
 def prior(one: Array, left: Array, other: Array, right: Array, limit: float, whole: float, scale: float = 0.0) -> Array:

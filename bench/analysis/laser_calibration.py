@@ -21,7 +21,7 @@ from sim.parameters import Parameters, quantity
 Array = NDArray[np.float64]
 
 ORDERS, PLACES = 20, 96
-"""Number of orders that a calibration determines, and of readings at which it tells the error curve."""
+"""Highest order that a calibration determines, and number of readings at which it tells the error curve."""
 
 
 class LaserCurve(Parameters):

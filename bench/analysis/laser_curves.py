@@ -1,7 +1,7 @@
 """Error curves of both lasers, from the equations that the second storey gives in every test.
 
 The curves are random functions as in `bench.analysis.error_curve`, for each pair of candidates for the two lasers; a
-pair is weighted by a power `CAUTION` of its evidence. They are splines through their values at readings `SPACING`
+pair is weighted by a power of its evidence. They are splines through their values at readings `SPACING`
 apart, of which the equations (`bench.analysis.storey_equations`) are linear functions, so that mean and covariance of
 the curves follow from Gaussian process regression (Rasmussen and Williams, 2006, section 2.2).
 
@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.analysis.error_curve import CAUTION, covariances
+from bench.analysis.error_curve import likelihoods, prior
 from bench.analysis.linearity import Effect, LinearFrame, LinearityErrors
 from bench.analysis.storey_equations import KEPT, StoreyMotion, storey_motion
 
@@ -87,7 +87,7 @@ class LaserCurves:
         places = self.places[laser]
         if effect is None:
             return np.zeros(places.size + laser)
-        row = _spline(places, np.eye(places.size))(np.clip(effect.places, places[0], places[-1])).T @ effect.weights
+        row = _basis(places)(effect.places) @ effect.weights
         return row if laser == 0 else np.append(row, effect.weights @ effect.places)
 
 
@@ -118,7 +118,7 @@ def laser_curves(
     removed = sum(each[2] for each in found)
     rows[:, -1] *= mismatch
     priors = [
-        0.5 * limit**2 * covariances(places, np.eye(places.size), places, np.eye(places.size), whole)
+        prior(places, np.eye(places.size), places, np.eye(places.size), limit, whole)
         for places, limit, whole in zip((first, second), limits, ranges, strict=True)
     ]
     observed = _observed(rows, values, removed, _blocks(moved, block), priors[0][FLEXIBLE], priors[1][FLEXIBLE])
@@ -222,8 +222,7 @@ def _posterior(observed: _Observed, first: Array, second: Array) -> tuple[Array,
     others = others + np.diag(observed.noise**2)
     factors = np.linalg.cholesky(own[:, None] + others[None])
     white = np.linalg.solve(factors, np.broadcast_to(observed.values[:, None], (*factors.shape[:3], 1)))[..., 0]
-    evidence = -0.5 * np.sum(white**2, axis=-1) - np.log(np.diagonal(factors, axis1=-2, axis2=-1)).sum(axis=-1)
-    likely = np.exp(CAUTION * (evidence - evidence.max()))
+    likely = likelihoods(factors, white)
     likely = np.where(likely >= LIKELY, likely, 0.0)
     likely /= likely.sum()
     one, other = np.nonzero(likely)

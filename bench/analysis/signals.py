@@ -101,6 +101,12 @@ class SignalMap:
         return signals
 
 
+def bridged(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """`values`, shape (n,), with missing ones interpolated; at least one is known."""
+    known = np.flatnonzero(np.isfinite(values))
+    return values if known.size == values.size else np.interp(np.arange(values.size), known, values[known])
+
+
 def scatter(signals: NDArray[np.float64]) -> float:
     """The larger of the standard deviations [m] of u1 and of the drift in signals of shape (n, n_signals); infinite if
     samples are missing.

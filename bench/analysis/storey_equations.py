@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 
 from bench.analysis.drift_zero import COMPLETE, shortest, strong_part
 from bench.analysis.linearity import LinearFrame
-from bench.analysis.signals import ACCELERATION, LASER_1, LASER_2
+from bench.analysis.signals import ACCELERATION, LASER_1, LASER_2, bridged
 
 Array = NDArray[np.float64]
 
@@ -152,13 +152,13 @@ def storey_motion(signals: Array, frame: LinearFrame, sample_rate: float) -> Sto
     if not (known.mean(axis=0) >= COMPLETE).all():
         return None
     every = max(int(sample_rate / (INNER * BAND)), 1)
-    values = _slower([_complete(signals[begin:end, column]) for column in columns], every, sample_rate)
+    values = _slower([bridged(signals[begin:end, column]) for column in columns], every, sample_rate)
     rate, n = sample_rate / every, values.shape[1]
     edge = _edge(nominal, rate)
     first = max(ceil((during.start - begin) / every), edge)
     last = min((during.stop - begin) // every, n - edge)
-    bridged = ~_near_gaps(np.asarray(known.all(axis=1)), nominal, sample_rate)
-    kept = first + KEPT * np.flatnonzero(bridged[first * every : last * every : KEPT * every])
+    usable = ~_near_gaps(np.asarray(known.all(axis=1)), nominal, sample_rate)
+    kept = first + KEPT * np.flatnonzero(usable[first * every : last * every : KEPT * every])
     if kept.size * KEPT / rate < shortest(frame):
         return None
     return StoreyMotion(rate, values[:2], None if frame.grounded else values[2], kept, nominal)
@@ -177,12 +177,6 @@ def _near_gaps(known: NDArray[np.bool_], nominal: float, rate: float) -> NDArray
 def _edge(nominal: float, rate: float) -> int:
     """Number of samples at `rate` [Hz] within which the filter forgets the ends of the signals."""
     return ceil(EDGE * sqrt(nominal) * rate)
-
-
-def _complete(values: Array) -> Array:
-    """`values`, shape (n,), with missing ones interpolated."""
-    known = np.flatnonzero(np.isfinite(values))
-    return values if known.size == values.size else np.interp(np.arange(values.size), known, values[known])
 
 
 def _slower(values: Sequence[Array], every: int, sample_rate: float) -> Array:

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.analysis.signals import bridged
 from bench.analysis.transient_base import noise_density
 from sim.errors import InvalidInput
 
@@ -105,7 +106,7 @@ def transient_peak(signal: Array, rest: Array, sample_rate: float) -> TransientP
         raise InvalidInput("rest before the transient", rest.size, allowed)
     if not known.any():
         raise InvalidInput("transient", signal.size, "it has no valid sample")
-    whole = np.interp(np.arange(signal.size), np.flatnonzero(known), signal[known])
+    whole = bridged(signal)
     density = noise_density(rest, sample_rate)
     sigma = _equivalent_noise(density, sample_rate)
     omega = _sixth_moment(whole, density, sample_rate)

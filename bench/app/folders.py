@@ -65,11 +65,21 @@ def remove_unused(folder: Path) -> None:
         folder.parent.rmdir()
 
 
+def checked_folder(named: Path | None, default: Path, results: Iterable[str]) -> Path:
+    """Folder of a run with these `results`: the `named` one, or the `default` for `make_folder`, which may exist with
+    the results of a run that began in the same second. Raises InvalidInput if they cannot be written.
+    """
+    if named is None:
+        check_folder(default, ())
+        return default
+    check_folder(named, results)
+    return named
+
+
 def check_folder(folder: Path, results: Iterable[str]) -> None:
     """Check that the `results` of a run can be written to a folder, without creating it.
 
-    A default folder is checked without `results`: if a run that began in the same second has it, `make_folder` creates
-    another one. Raises InvalidInput naming the reason if they cannot be written.
+    Raises InvalidInput naming the reason if they cannot be written.
     """
     existing = folder
     try:

@@ -7,7 +7,7 @@ from typing import Any
 
 from bench.app.catalogue import load_protocol
 from bench.app.cli.interrupt import interruptible
-from bench.app.folders import check_folder, default_folder, make_folder, remove_unused, result_names
+from bench.app.folders import checked_folder, default_folder, make_folder, remove_unused, result_names
 from bench.app.measurements import Campaign
 from bench.app.predictions import File, configured, python_names, valid
 from bench.app.preflight import prepare
@@ -69,7 +69,7 @@ def run(
         )
         raise InvalidInput("operator", None, allowed)
     person, requests = _Person(operator), Requests()
-    folder = default_folder(protocol, datetime.now()) if out is None else Path(out)
+    named = None if out is None else Path(out)
 
     def follow(event: Event) -> None:
         if progress is not None and isinstance(event, Progress):
@@ -80,8 +80,8 @@ def run(
             progress(text, done / total if total else 0.0)
 
     with python_names():
-        check_folder(folder, () if out is None else result_names(chosen))
-        folder = make_folder(folder) if out is None else folder
+        folder = checked_folder(named, default_folder(protocol, datetime.now()), result_names(chosen))
+        folder = make_folder(folder) if named is None else folder
         try:
             with interruptible(requests, asking=lambda: person.asking) as interrupts:
                 with requests.without_rig():

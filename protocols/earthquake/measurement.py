@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from bench.analysis.fall import FallWatch
 from bench.analysis.reading_correction import ReadingCorrection
-from bench.analysis.signals import ACCELERATION, DRIFT, U1
+from bench.analysis.signals import ACCELERATION, DRIFT, U1, bridged
 from bench.analysis.transient_base import BaseMotion
 from bench.analysis.transient_peak import RunningPeak, running_peak
 from bench.control.passes import SpectrumCheck
@@ -71,11 +71,9 @@ def overturning_time(signals: NDArray[np.float64], sample_rate: float, specimen:
     """
     span = min(round(2.0 * np.pi / specimen.frame.natural_frequencies[0] * sample_rate), len(signals))
     u1 = signals[:, U1]
-    known = np.isfinite(u1)
-    if not known.any():
+    if not np.isfinite(u1).any():
         return None
-    values = np.interp(np.arange(u1.size), np.flatnonzero(known), u1[known])
-    mean = np.convolve(values, np.full(span, 1.0 / span), mode="same")
+    mean = np.convolve(bridged(u1), np.full(span, 1.0 / span), mode="same")
     # at the end the last valid mean is kept, since half the window is beyond the last sample
     mean[-(span // 2) :] = mean[-(span // 2) - 1]
     below = np.flatnonzero(np.abs(mean) <= FallWatch(specimen, sample_rate).threshold)

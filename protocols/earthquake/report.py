@@ -78,10 +78,13 @@ def seismic_sections(campaign: Campaign) -> list[Section]:
 def _advice(campaign: Campaign, points: Sequence[Mapping[str, Any]]) -> list[Part]:
     if campaign.configuration is None:
         return []
-    # files of earlier versions have no such parameter
-    stored = {"laser_block": None} | dict(campaign.parameters)
-    found = advice(validated(EarthquakeParameters, stored), campaign.configuration, points)
+    found = advice(_parameters_of(campaign), campaign.configuration, points)
     return [typeset(found)] if found else []
+
+
+def _parameters_of(campaign: Campaign) -> EarthquakeParameters:
+    """Parameters of the run; files of earlier versions have no `laser_block`."""
+    return validated(EarthquakeParameters, {"laser_block": None} | campaign.parameters)
 
 
 def _gains(points: Sequence[Mapping[str, Any]]) -> Table:
@@ -192,7 +195,7 @@ def _statement(campaign: Campaign, points: Sequence[Mapping[str, Any]]) -> list[
     """Table of the verdicts on the paper's statement, for measured and predicted gains in the band of the campaign."""
     if campaign.configuration is None:
         return []
-    parameters = validated(EarthquakeParameters, campaign.parameters)
+    parameters = _parameters_of(campaign)
     low, high = band_used(parameters, campaign.configuration)
     checked = check_statement(points, (low, high))
     rows = [["the paper, experiments", "holds", "about 0.5", "holds", "holds"]]
@@ -281,7 +284,7 @@ def histories_parts(campaign: Campaign) -> list[Part]:
     names = list(dict.fromkeys(row["record"] for row in campaign.seismic_points))
     plays = played_records(record)
     try:
-        parameters = validated(EarthquakeParameters, campaign.parameters)
+        parameters = _parameters_of(campaign)
         known = {shaking.name: shaking for shaking in _shakings(campaign, parameters)}
     except InvalidInput as refused:
         return [Notice(f"Histories are not drawn because the records cannot be prepared: {refused}.")]

@@ -22,12 +22,13 @@ from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
 from bench.analysis.cycles import Cycle, mean_waves
+from bench.analysis.laser_calibration import ORDERS
 from bench.analysis.signals import ACCELERATION, DISPLACEMENT, LASER_1, LASER_2
 from protocols.laser_calibration.polynomial import fit_polynomial, scatter, values
 
 Array = NDArray[np.float64]
 
-HIGHEST = 20
+HIGHEST = ORDERS
 """Highest order of the fit, sufficient for an error with six periods over the measuring range if the passes cover half
 of it.
 """

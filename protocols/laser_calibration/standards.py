@@ -14,7 +14,7 @@ from math import hypot, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.analysis.error_curve import CAUTION, LEAST, WAVES, covariances
+from bench.analysis.error_curve import LEAST, WAVES, likelihoods, prior
 from bench.analysis.sensor_accuracy import SensorAccuracy
 from protocols.laser_calibration.curves import ErrorCurve
 
@@ -102,9 +102,7 @@ def _mean_square_of_slopes(
     covariance = first[:, None, 1:, 1:] + second[None, :, 1:, 1:] + noise * np.eye(apart.size)
     factors = np.linalg.cholesky(covariance)
     white = np.linalg.solve(factors, np.broadcast_to(apart[:, None], (*covariance.shape[:3], 1)))[..., 0]
-    half_logs = np.log(np.diagonal(factors, axis1=-2, axis2=-1)).sum(axis=-1)
-    evidence = -0.5 * np.einsum("ijm,ijm->ij", white, white) - half_logs
-    likely = np.exp(CAUTION * (evidence - evidence.max()))
+    likely = likelihoods(factors, white)
     slopes = first[:, None, 0, 0] + second[None, :, 0, 0]
     return float((likely * slopes).sum() / likely.sum())
 
@@ -119,5 +117,4 @@ def _moments(curve: ErrorCurve, limit: float, whole: float) -> Array:
     functions[0, -2:] = -0.5 / half, 0.5 / half
     functions[1:, :-2] = 2.0 / NODES * np.cos(np.outer(np.arange(2, COMPARED + 1), angles))
     places = np.append(middle + half * np.cos(angles), [curve.low, curve.high])
-    found = covariances(places, functions, places, functions, whole)
-    return 0.5 * limit**2 * found[np.tile(WAVES, 2) >= LEAST_WAVES]
+    return prior(places, functions, places, functions, limit, whole)[np.tile(WAVES, 2) >= LEAST_WAVES]

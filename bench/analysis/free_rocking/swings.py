@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.analysis.signals import bridged
 from sim import block_face
 from sim.errors import RockbenchError
 from sim.specimen import Block
@@ -79,9 +80,7 @@ def without_gaps(seen: Recording) -> Recording:
             f"the laser has no valid reading at {at:.2f} s: check that the block stays within the laser's range, "
             "then repeat the tilt"
         )
-    if known.size == seen.displacement.size:
-        return seen
-    return replace(seen, displacement=np.interp(np.arange(seen.displacement.size), known, seen.displacement[known]))
+    return replace(seen, displacement=bridged(seen.displacement))
 
 
 def find_swings(seen: Recording, least: float) -> Swings:

@@ -91,13 +91,12 @@ def _run(
         )
     from bench.app.cli.inputs import configuration_from, parameters_from, with_profile
     from bench.app.cli.terminal import choose
-    from bench.app.folders import check_folder, default_folder, make_folder, remove_unused, result_names
+    from bench.app.folders import checked_folder, default_folder, make_folder, remove_unused, result_names
 
     parameters = parameters_from(protocol.parameters, typed, options.protocol_file)
     configuration = configuration_from(options.config, options.seed, options.specimen)
     configuration = with_profile(configuration, options.profile)
-    out = options.out or default_folder(protocol.name, datetime.now())
-    check_folder(out, () if options.out is None else result_names(protocol))
+    out = checked_folder(options.out, default_folder(protocol.name, datetime.now()), result_names(protocol))
     if options.queue is not None:
         _check_for_queue(options)
         return _add_to_queue(options.queue, protocol, parameters, configuration, options, progress)

@@ -22,7 +22,7 @@ from PySide6.QtWidgets import (
 
 from bench.app.display import texts
 from bench.app.display.typography import typeset
-from bench.app.folders import check_folder, default_folder, make_folder, remove_unused, result_names
+from bench.app.folders import checked_folder, default_folder, make_folder, remove_unused, result_names
 from bench.app.gui.controller import Controller
 from bench.app.gui.form import Form, RunOptions
 from bench.app.gui.help_panel import HelpPanel
@@ -245,8 +245,7 @@ class ProtocolPage(QWidget):
     def _plan_check(self) -> PlanCheck:
         """Plan check with the values of the form. Raises InvalidInput for an invalid value or an unusable folder."""
         entry, parameters = self.entry, self.form.parameters()
-        out = self.options.out or Path(self.folder.placeholderText())
-        check_folder(out, () if self.options.out is None else result_names(entry))
+        out = checked_folder(self.options.out, Path(self.folder.placeholderText()), result_names(entry))
         return PlanCheck(entry.name, parameters, self._configuration, out)
 
     def _choose(self, index: int) -> None:
