@@ -32,7 +32,7 @@ def assert_honest(study: Study, benches: int) -> None:
     [
         # few of the gain under a sine, of which each takes longer
         ("alpha_2, default, 16, 0.4", 5),
-        ("record, default, pacoima, 0.97", 10),
+        ("record, default, pacoima, 0.97", 6),
         *(
             pytest.param(name, benches, marks=pytest.mark.soak)
             for name, benches in (

@@ -368,7 +368,7 @@ def test_old_folders_go_but_none_that_a_process_uses(installation: Installation)
     assert not held.exists()
 
 
-@pytest.mark.parametrize("times", [12, pytest.param(400, marks=pytest.mark.soak)])
+@pytest.mark.parametrize("times", [4, pytest.param(400, marks=pytest.mark.soak)])
 def test_processes_that_start_and_clear_up_together_all_get_a_folder(times: int, installation: Installation) -> None:
     code = (
         "import sys\nfrom sim.kernel.cache import KernelCache\n"

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import cache
 from math import tau
 
 import numpy as np
@@ -66,7 +67,7 @@ def motions(
 
     def rate(t: float, y: Array) -> Array:
         drift, speed = y[:n] - below(t), y[n:] - moving(t)
-        force = k * (1.0 + cubic * drift**2) * drift + C * speed + yielding * np.tanh(speed / 1e-3)
+        force = k * (1.0 + cubic * drift**2) * drift + C * speed + yielding * np.tanh(speed / 5e-3)
         return np.concatenate((y[n:], -force))
 
     found = solve_ivp(rate, (0.0, TIME[-1]), np.zeros(2 * n), t_eval=TIME, rtol=1e-9, atol=1e-10, max_step=0.05)
@@ -123,14 +124,16 @@ def peaks(found: LaserCurves, tests: list[tuple[Motion, Array]]) -> tuple[float,
     return raw[1] - raw[0], corrected[1] - corrected[0], stated
 
 
-MOTIONS = motions({1: 0.03, 2: 0.02})
+@cache
+def two_motions() -> list[Motion]:
+    return motions({1: 0.03, 2: 0.02})
 
 
 @pytest.mark.parametrize(("frame", "grounded"), [(GROUND, True), (TABLE, False)])
 def test_exact_readings_leave_nothing_in_the_equations(frame: LinearFrame, grounded: bool) -> None:
     """Also with another stiffness than the nominal one, which is fitted."""
     none = curve(0.0, 0.0)
-    for moved in (MOTIONS[0], *motions({3: 0.03}, softer=0.93)):
+    for moved in (two_motions()[0], *motions({3: 0.03}, softer=0.93)):
         seen = storey_motion(signals(moved, (none, none), grounded=grounded), frame, RATE)
         assert seen is not None
         rows, values, removed = seen.equations((np.atleast_2d, np.atleast_2d))
@@ -139,20 +142,21 @@ def test_exact_readings_leave_nothing_in_the_equations(frame: LinearFrame, groun
         assert np.sqrt(np.mean(values**2)) < 1e-6
 
 
+@pytest.mark.parametrize("draws", [4, pytest.param(16, marks=pytest.mark.soak)])
 @pytest.mark.parametrize(("waves", "other", "grounded"), [(0.7, 1.2, True), (3.5, 0.8, False), (4.6, 5.3, True)])
 def test_the_errors_of_a_ratio_become_small_and_are_as_large_as_stated(
-    waves: float, other: float, grounded: bool
+    waves: float, other: float, grounded: bool, draws: int
 ) -> None:
     raw, left, stated = [], [], []
-    for number in range(8):
+    for number in range(draws):
         phases = np.random.default_rng([number, 3]).uniform(0.0, tau, 2)
         slope = MISMATCH * np.random.default_rng([number, 4]).standard_normal()
         errors = curve(waves, phases[0]), curve(other, phases[1], slope)
-        seen = [signals(each, errors, 1.5e-5, 2 * number + k, grounded) for k, each in enumerate(MOTIONS)]
+        seen = [signals(each, errors, 1.5e-5, 2 * number + k, grounded) for k, each in enumerate(two_motions())]
         found = found_in(*seen, frame=GROUND if grounded else TABLE)
         assert found is not None
-        exact = [signals(each, errors, grounded=grounded) for each in MOTIONS]
-        one = peaks(found, list(zip(MOTIONS, exact, strict=True)))
+        exact = [signals(each, errors, grounded=grounded) for each in two_motions()]
+        one = peaks(found, list(zip(two_motions(), exact, strict=True)))
         for values, value in zip((raw, left, stated), one, strict=True):
             values.append(value)
     off = np.array(left) / np.array(stated)
@@ -161,12 +165,17 @@ def test_the_errors_of_a_ratio_become_small_and_are_as_large_as_stated(
     assert np.abs(off).max() < 3.5
 
 
+@pytest.mark.parametrize("draws", [3, pytest.param(12, marks=pytest.mark.soak)])
 @pytest.mark.parametrize(("cubic", "friction"), [(100.0, 0.0), (0.0, 0.01), (40.0, 0.01)])
-def test_stiffness_that_is_not_constant_and_friction_cause_no_false_errors(cubic: float, friction: float) -> None:
+def test_stiffness_that_is_not_constant_and_friction_cause_no_false_errors(
+    cubic: float, friction: float, draws: int
+) -> None:
     """16 to 69 % more stiffness at the largest drifts, of 40 to 83 mm, and a friction of 1 % of the force at 50 mm."""
     off, sizes = [], []
-    moved = motions({seed: 0.02 if seed % 2 else 0.015 for seed in range(1, 13)}, cubic=cubic, friction=friction)
-    for number in range(6):
+    moved = motions(
+        {seed: 0.02 if seed % 2 else 0.015 for seed in range(1, 2 * draws + 1)}, cubic=cubic, friction=friction
+    )
+    for number in range(draws):
         tests = moved[2 * number :][:2]
         phases = np.random.default_rng([number, 5]).uniform(0.0, tau, 2)
         errors = curve(1.5, phases[0]), curve(1.2, phases[1])
@@ -182,7 +191,7 @@ def test_stiffness_that_is_not_constant_and_friction_cause_no_false_errors(cubic
 
 def test_a_delay_that_wanders_between_the_lasers_causes_no_false_errors() -> None:
     """A held reading of a laser at 4 kHz becomes older and younger by its period of 0.25 ms within 7 s."""
-    moved, none = MOTIONS[0], curve(0.0, 0.0)
+    moved, none = two_motions()[0], curve(0.0, 0.0)
     seen = signals(moved, (none, none), 1.5e-5)
     late = 2.5e-4 * ((TIME / 7.0) % 1.0 - 0.5)
     seen[:, LASER_2] -= late * np.gradient(moved.second, 1.0 / RATE)
@@ -198,7 +207,7 @@ def test_a_delay_that_wanders_between_the_lasers_causes_no_false_errors() -> Non
 
 def test_more_tests_of_the_same_lasers_tell_more() -> None:
     errors = curve(1.5, 1.0), curve(2.2, 2.0)
-    one, two = (signals(each, errors, 1.5e-5, k) for k, each in enumerate(MOTIONS))
+    one, two = (signals(each, errors, 1.5e-5, k) for k, each in enumerate(two_motions()))
     alone, both = found_in(two), found_in(one, two)
     assert alone is not None
     assert both is not None
@@ -208,7 +217,7 @@ def test_more_tests_of_the_same_lasers_tell_more() -> None:
 
 def test_missing_samples_are_bridged_and_a_motion_without_enough_of_them_tells_nothing() -> None:
     errors = curve(1.5, 1.0), curve(1.2, 2.0)
-    seen = signals(MOTIONS[0], errors, 1.5e-5)
+    seen = signals(two_motions()[0], errors, 1.5e-5)
     whole = found_in(seen)
     assert whole is not None
     few = seen.copy()
@@ -235,7 +244,7 @@ def test_a_laser_that_errs_more_than_its_data_sheet_allows_is_named() -> None:
         def larger(x: Array, times: float = times) -> Array:
             return times * curve(1.5, 1.0)(x)
 
-        seen = [signals(each, (curve(1.2, 2.0), larger), 1.5e-5, k) for k, each in enumerate(MOTIONS)]
+        seen = [signals(each, (curve(1.2, 2.0), larger), 1.5e-5, k) for k, each in enumerate(two_motions())]
         found = plain.found_in(seen, GROUND, RATE, BLOCK)
         remarks = found.rough(found.shapes([]))
         assert len(remarks) == named
@@ -244,7 +253,7 @@ def test_a_laser_that_errs_more_than_its_data_sheet_allows_is_named() -> None:
 
 def test_near_a_long_gap_there_are_no_equations() -> None:
     errors = curve(1.5, 1.0), curve(1.2, 2.0)
-    seen = [signals(each, errors, 1.5e-5, k) for k, each in enumerate(MOTIONS)]
+    seen = [signals(each, errors, 1.5e-5, k) for k, each in enumerate(two_motions())]
     lost = seen[0].copy()
     begin = round(6.0 * RATE)
     lost[begin : begin + round(0.25 * RATE), [LASER_1, DRIFT]] = np.nan
@@ -252,17 +261,17 @@ def test_near_a_long_gap_there_are_no_equations() -> None:
     assert whole is not None
     assert found is not None
     assert found.noise < 1.2 * whole.noise
-    exact = [(each, signals(each, errors)) for each in MOTIONS]
+    exact = [(each, signals(each, errors)) for each in two_motions()]
     _, left, stated = peaks(found, exact)
     assert abs(left) < 3.0 * stated < 5e-4
     # an accelerometer that is lost, for lasers on the table
-    table = signals(MOTIONS[0], errors, grounded=False)
+    table = signals(two_motions()[0], errors, grounded=False)
     table[:, ACCELERATION] = np.nan
     assert found_in(table, frame=TABLE) is None
 
 
 def test_nothing_is_corrected_at_rest_and_a_missing_reading_stays_missing() -> None:
-    found = found_in(signals(MOTIONS[0], (curve(1.5, 1.0), curve(1.2, 2.0)), 1.5e-5))
+    found = found_in(signals(two_motions()[0], (curve(1.5, 1.0), curve(1.2, 2.0)), 1.5e-5))
     assert found is not None
     for laser in (0, 1):
         expected = found.expected(laser, np.array([0.0, np.nan, 0.01]))
@@ -271,7 +280,7 @@ def test_nothing_is_corrected_at_rest_and_a_missing_reading_stays_missing() -> N
 
 
 def test_the_sensors_have_the_errors_of_the_tests_unless_these_tell_none() -> None:
-    seen = signals(MOTIONS[0], (curve(1.5, 1.0), curve(1.2, 2.0)), 1.5e-5)
+    seen = signals(two_motions()[0], (curve(1.5, 1.0), curve(1.2, 2.0)), 1.5e-5)
     plain = SensorUncertainty(SensorAccuracy(), (WHOLE, WHOLE))
     found = plain.found_in([seen], GROUND, RATE, BLOCK)
     assert found.shapes_known
