@@ -11,7 +11,7 @@ Numer. Anal. 10, 1973); the matrix pencil (Hua and Sarkar, IEEE Trans. ASSP 38, 
 """
 
 from dataclasses import dataclass, replace
-from math import log, pi, tau
+from math import log, pi
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,8 +41,14 @@ one.
 PENCIL = 3
 """Ratio of the number of cycles to the row length of the matrix pencil."""
 
-RATIOS = np.geomspace(1e-6, 1e4, 101)
-"""Ratios of the variances of excitation and scatter that are compared."""
+RATIOS = np.geomspace(1e-4, 1e2, 31)
+"""Ratios of the variances of excitation and scatter, of which the mean is formed."""
+
+PRIOR = 0.25
+"""Power of a ratio to which its prior probability is proportional: between 0, with which most of the excitation is
+missed where few cycles show it, and 1/2 (the standard deviation has a uniform density), with which it is found where
+there is none. With 60 cycles, 89 to 97 % of the intervals cover the multiplier for excitations up to the scatter.
+"""
 
 EARLY = 6
 """Ratio of the number of cycles to that of the first ones, without which the fit is repeated: most pairs that are not
@@ -210,7 +216,8 @@ def _stated(fit: _Fit, size: float) -> Multiplier:
     inverse = np.linalg.inv(np.tensordot(fit.slopes, fit.slopes, ((0, 1), (0, 1))))
     correlated = np.tensordot(fit.slopes, np.matmul(between, fit.slopes), ((0, 1), (0, 1)))
     dominant = complex(fit.multipliers[0])
-    excitation = _excited(_along(whitened, fit.pattern), dominant)
+    # pairs that are not fitted, and have not decayed yet, would be taken for an excitation
+    excitation = _excited(_along(whitened[n // EARLY :], fit.pattern), dominant)
     carried = _carried(np.tensordot(fit.pattern, fit.slopes, (0, 1)), dominant)
     covariance = inverse @ (correlated + 0.5 * excitation * (carried.T @ carried.conj()).real) @ inverse
     spread = np.sqrt(np.diag(covariance)[:2])
@@ -243,21 +250,30 @@ def _along(whitened: Array, pattern: Complex) -> Complex:
 def _excited(along: Complex, multiplier: complex) -> float:
     """Variance of the excitation w of a coordinate z_n = s_n + e_n, s_(n+1) = mu s_n + w_n, with scatter e.
 
-    That of maximum likelihood among `RATIOS` to the variance of e, from the spectrum of z_(n+1) - mu z_n (Whittle, J.
-    R. Stat. Soc. B 15, 1953), in which excitation is white.
+    It is the mean over the `RATIOS` to the variance of e, weighted by their restricted likelihood (Patterson and
+    Thompson, Biometrika 58, 1971), which allows for what the fit absorbs. In z_(n+1) - mu z_n, excitation is white, and
+    only neighbours are correlated by scatter: in a frame that turns with mu, sines are the eigenvectors for all ratios.
     """
+    from scipy.fft import dst
+
     changes = along[1:] - multiplier * along[:-1]
-    n = changes.size
-    power = np.abs(np.fft.fft(changes)) ** 2 / n
-    if not power.any():
+    n, modulus = changes.size, abs(multiplier)
+    turned = np.exp(-1j * np.angle(multiplier) * np.arange(n))
+    # other values of the orbit and of mu change these
+    absorbed = _powers(n, np.array([np.log(modulus), 0.0]))[:, 0], turned
+    lines: Complex = dst(np.stack((*absorbed, changes * turned)), type=1, norm="ortho")
+    if not lines[-1].any():
         return 0.0
-    # the scatter of the first and the last cycle occurs in one change only, which counts as an excitation of 2 / n of
-    # its variance; less could not be distinguished from none in n cycles
-    of_scatter = np.abs(1.0 - multiplier * np.exp(-1j * tau * np.arange(n) / n)) ** 2
+    of_scatter = 1.0 + modulus**2 - 2.0 * modulus * np.cos(pi * np.arange(1, n + 1) / (n + 1))
     spectra: Array = of_scatter + RATIOS[:, None]
-    scatter = np.mean(power / spectra, axis=1)
-    likeliest = int(np.argmin(np.mean(np.log(spectra), axis=1) + np.log(scatter)))
-    return float(RATIOS[likeliest] * scatter[likeliest])
+    products: Complex = np.einsum("jn,kn,rn->rjk", lines.conj(), lines, 1.0 / spectra)
+    normal, effects = products[:, :2, :2], products[:, :2, 2:]
+    left: Array = (products[:, 2:, 2:] - effects.conj().swapaxes(1, 2) @ np.linalg.solve(normal, effects)).real.ravel()
+    free = n - len(absorbed)
+    likelihood = -np.sum(np.log(spectra), axis=1) - np.linalg.slogdet(normal).logabsdet - free * np.log(left)
+    likelihood += PRIOR * np.log(RATIOS)
+    weights = np.exp(likelihood - likelihood.max())
+    return float(np.sum(weights * RATIOS * left) / (np.sum(weights) * (free - 1)))
 
 
 def _carried(effects: Complex, multiplier: complex) -> Complex:
