@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from bench.analysis import free_motion
 from bench.analysis.cycles import Cycle, CycleAnalyser
-from bench.engine import loop
+from bench.engine import drives
 from drivers.simulated import SimulatedRig
 from protocols.common.sine import settling
 from tests.benchmarks.estimates import Estimate, Statistics
@@ -89,7 +89,7 @@ def witnessed() -> Generator[Witness]:
     with (
         patch.object(SimulatedRig, "begin", begun),
         patch.object(SimulatedRig, "respond", responded),
-        patch.object(loop, "CycleAnalyser", made),
+        patch.object(drives, "CycleAnalyser", made),
         patch.object(settling, "steady_peak", before(settling.steady_peak, note_bare)),
         patch.object(settling, "free_motion", before(settling.free_motion, note_free)),
     ):
