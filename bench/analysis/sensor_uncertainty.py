@@ -63,6 +63,11 @@ class SensorUncertainty:
         return self.accuracy.table_scale if self.calibration is None else self.calibration.table_uncertainty
 
     @property
+    def mismatch(self) -> float:
+        """Standard uncertainty of the ratio of the lasers' scales."""
+        return self.accuracy.laser_mismatch if self.calibration is None else self.calibration.differential_uncertainty
+
+    @property
     def shapes_known(self) -> bool:
         """Whether the shapes of the lasers' linearity errors were calibrated, checked or found."""
         return self.calibration is not None or self.curves is not None or bool(self.checks)
@@ -99,14 +104,14 @@ class SensorUncertainty:
         self, tests: Sequence[Array], frame: LinearFrame, sample_rate: float, block: float
     ) -> "SensorUncertainty":
         """A copy for readings corrected for the errors that the signals of `tests` reveal, with residuals that may be
-        correlated for `block` seconds (`bench.analysis.laser_curves`); the same object if `block` is zero, if the
-        lasers are calibrated, or if the tests reveal none.
+        correlated for `block` seconds (`bench.analysis.laser_curves`); the same object if `block` is zero, or if the
+        tests reveal none. What is left of the errors of calibrated lasers, also beyond the calibrated readings, is
+        found in the same way.
         """
-        if not block or self.calibration is not None:
+        if not block:
             return self
         first, second = (self.accuracy.laser_linearity * whole for whole in self.ranges)
-        mismatch = self.accuracy.laser_mismatch
-        curves = laser_curves(tests, frame, sample_rate, (first, second), self.ranges, mismatch, block)
+        curves = laser_curves(tests, frame, sample_rate, (first, second), self.ranges, self.mismatch, block)
         return self if curves is None else replace(self, checks=(), corrected=True, curves=curves)
 
     def checks_of(self, laser: int) -> list[Harmonics]:
@@ -137,11 +142,8 @@ class SensorUncertainty:
         """Errors [m] due to linearity, according to `shapes`, and due to the difference between the scales."""
         first, second = (self._linearity(laser, shapes.lasers[laser], seen, draws) for laser in (0, 1))
         common = 0.0 if shapes.common is None else shapes.common.draws(draws.normal(len(seen)))
-        mismatch = self.accuracy.laser_mismatch
-        if self.calibration is not None:
-            mismatch = self.calibration.differential_uncertainty
         means = np.array([[0.5 * sum(each.lasers) - 0.5 * float(each.zero.mean(axis=1).sum())] for each in seen])
-        return {LINEARITY: second - first + common, SCALES: means * mismatch * draws.normal()}
+        return {LINEARITY: second - first + common, SCALES: means * self.mismatch * draws.normal()}
 
     def linearity(self, laser: int, seen: Sequence[PeakReadings], draws: Draws) -> Array:
         """Errors [m] of the peaks due to the linearity of laser 0 or 1, in each test, shape (tests, n)."""

@@ -289,7 +289,9 @@ def test_the_sensors_have_the_errors_of_the_tests_unless_these_tell_none() -> No
     assert plain.found_in([seen], GROUND, RATE, 0.0) is plain
     assert plain.found_in([np.zeros_like(seen)], GROUND, RATE, BLOCK) is plain
     calibrated = replace(plain, calibration=calibration(-0.1, 0.1))
-    assert calibrated.found_in([seen], GROUND, RATE, BLOCK) is calibrated
+    left = calibrated.found_in([seen], GROUND, RATE, BLOCK).curves
+    assert left is not None
+    assert 0.0 < left.covariance[-1, -1] <= 1.01 * calibrated.mismatch**2 < 0.02 * plain.mismatch**2
     readings = PeakReadings(
         drift=0.02,
         sign=1.0,

@@ -149,9 +149,14 @@ def test_calibrated_lasers_have_the_zero_from_momentum_without_a_check(
     stored: Callable[..., BenchConfiguration],
 ) -> None:
     calibrated = stored().model_copy(update={"calibrated": calibration(-0.1, 0.1)})
-    _, (point,) = played_through(calibrated, ONE, lambda *_: None)
+    by_calibration, found = ONE.model_copy(update={"laser_block": 0.0}), ONE
+    (_, (point,)), (_, (narrower,)) = (
+        played_through(calibrated, each, lambda *_: None) for each in (by_calibration, found)
+    )
     assert point.alpha_2 is not None
     assert point.drift_peak_m is not None
+    # what a calibration leaves of the lasers' errors is found in the motion
+    assert narrower.alpha_2_uncertainty < 0.5 * point.alpha_2_uncertainty
     # the zeros at rest of two lasers, each within one step
     at_rest = point.alpha_2 * calibrated.analysis.laser_resolution / np.sqrt(6.0) / point.drift_peak_m
     assert json.loads(point.uncertainty_parts)[STEPS] < 0.3 * at_rest
