@@ -37,6 +37,11 @@ FEWEST = 4
 ROUNDING = 1e-10
 """Relative size of a combination below which it is due to rounding."""
 
+IMPOSSIBLE = 0.02
+"""Slope of a curve beyond which the curves explain the motion instead of its errors: readings that are all error would
+solve every equation exactly, which in long and weak motions seems more likely than noise.
+"""
+
 USEFUL, LIKELY = 1e-3, 1e-3
 """Smallest variance of an observation relative to its noise, and smallest weight of a pair relative to the largest,
 that are not neglected."""
@@ -101,7 +106,8 @@ def laser_curves(
     block: float,
 ) -> LaserCurves | None:
     """Curves according to the signals of `tests` with the same lasers, shape (n, len(SIGNALS)) each, of a `frame` with
-    or without block; None if no test has a strong motion that is long and complete enough.
+    or without block; None if no test has a strong motion that is long and complete enough, or if the motions do not
+    distinguish errors from noise.
 
     `limits` are the largest linearity errors and `ranges` the measuring ranges of the lasers [m]; `mismatch` is the
     standard uncertainty of the ratio of their scales. Residuals may be correlated within `block` seconds.
@@ -125,6 +131,12 @@ def laser_curves(
     if not observed.values.size:
         return None
     mean, covariance = _posterior(observed, priors[0], priors[1])
+    curves = mean[: first.size], mean[first.size : -1]
+    if any(
+        abs(places @ each) > IMPOSSIBLE * (places @ places)
+        for places, each in zip((first, second), curves, strict=True)
+    ):
+        return None
     sizes = np.append(np.ones(mean.size - 1), mismatch)
     return LaserCurves(
         (first, second), sizes * mean, np.outer(sizes, sizes) * covariance, float(np.sqrt(np.mean(observed.noise**2)))
