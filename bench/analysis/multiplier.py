@@ -51,8 +51,8 @@ there is none. With 60 cycles, 89 to 97 % of the intervals cover the multiplier 
 """
 
 EARLY = 6
-"""Ratio of the number of cycles to that of the first ones, without which the fit is repeated: most pairs that are not
-fitted have decayed by then.
+"""Ratio of the number of cycles to that of the first ones, without which the fit is repeated and the excitation found:
+most pairs that are not fitted have decayed by then.
 """
 
 PASSES = 3

@@ -177,7 +177,9 @@ class SensorUncertainty:
         return errors if shape is None else errors + shape.draws(normal)
 
     def shapes(self, seen: Sequence[PeakReadings]) -> Shapes:
-        """Errors of the peaks due to the unknown shapes of the linearity errors."""
+        """Errors of the peaks due to the unknown shapes of the linearity errors; none if the curves were found."""
+        if self.curves is not None:
+            return Shapes((None, None))
         lasers = self._shape(0, seen), self._shape(1, seen)
         if self.calibration is None:
             return Shapes(lasers)
@@ -190,10 +192,8 @@ class SensorUncertainty:
 
     def _shape(self, laser: int, seen: Sequence[PeakReadings]) -> LinearityErrors | None:
         """Linearity errors of laser 0 or 1; for a calibrated laser, only those outside the calibrated range, None if no
-        reading is outside it. None if the curves were found.
+        reading is outside it.
         """
-        if self.curves is not None:
-            return None
         whole = self.ranges[laser]
         limit = self.accuracy.laser_linearity * whole
         effects = [each.effect(laser) for each in seen]

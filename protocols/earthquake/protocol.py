@@ -91,8 +91,9 @@ class EarthquakeParameters(Parameters):
     laser_block: float | None = quantity(
         4.0,
         "s",
-        "the errors of lasers without calibration are found from the motion of the second storey in both tests of a "
-        "point, with residuals that may be correlated for this long; 0: as stated by the data sheet, or by the check",
+        "the errors of the lasers, or what a calibration leaves of them, are found from the motion of the second "
+        "storey in both tests of a point, with residuals that may be correlated for this long; 0: as stated by the "
+        "data sheet, the check or the calibration",
         ge=0,
         le=60,
         usual=(0.5, 20.0),

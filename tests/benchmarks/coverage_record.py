@@ -37,8 +37,8 @@ PAUSE = 60.0
 DRAWS = 4000
 
 Source = Literal["motion", "check", "data sheet"]
-"""What the linearity errors of lasers without calibration are known from: the motion of the second storey in both
-tests, the harmonics of a sine before them, or the data sheet alone."""
+"""What the linearity errors of the lasers, or what a calibration leaves of them, are known from: the motion of the
+second storey in both tests, the harmonics of a sine before them, or the data sheet or calibration alone."""
 
 ASKED = EarthquakeParameters()
 
@@ -98,8 +98,8 @@ class Measured:
 
 
 def measured(seed: int, name: str, beta: float, case: Case, source: Source = "motion") -> Measured:
-    """The peak drift ratio of one bench, coupled over bare, whose linearity errors are known from this `source` unless
-    they are calibrated; the true one is that of the motions.
+    """The peak drift ratio of one bench, coupled over bare, whose linearity errors are known from this `source`, and
+    from a calibration if there is one; the true one is that of the motions.
     """
     bare, coupled = motion_under(name, None), motion_under(name, beta)
     sensors = Sensors(seed, case, pause=PAUSE)
