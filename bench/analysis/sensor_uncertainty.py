@@ -223,8 +223,8 @@ class SensorUncertainty:
         if self.calibration is not None or not self.checks or self.accuracy.laser_linearity == 0.0:
             return ()
         return tuple(
-            f"the linearity error of laser_{laser} is not smooth: it has about {each.waves:.1f} waves over the range; "
-            "`rockbench run laser-calibration` measures it"
+            f"the linearity error of laser_{laser} is not smooth: it has about {each.waves:.1f} waves over the range, "
+            "which `rockbench run laser-calibration` measures"
             for laser, each in enumerate(shapes.lasers, 1)
             if each is not None and each.waves > SMOOTH
         )

@@ -15,6 +15,9 @@ from bench.live_values import Estimate, LiveValue, RunningGain, TwinEstimate
 NOTICES = 5
 """Maximum number of displayed notices; the latest are kept."""
 
+LONG = 80
+"""Fewest characters of a remark that is not repeated in the lines of further points."""
+
 
 @dataclass(frozen=True)
 class Notice:
@@ -115,20 +118,31 @@ def live_line(live: LiveValue) -> str:
     return f"{text}, predicted {predicted}, difference {difference(live.value, live.predicted)}"
 
 
-def notice_of(event: Event) -> Notice | None:
-    """The event as a line of the log; None for an event that is not logged."""
+def notice_of(event: Event, told: set[str] | None = None) -> Notice | None:
+    """The event as a line of the log; None for an event that is not logged.
+
+    Long remarks on a point that have been `told` are counted instead of repeated; those of this point are added.
+    """
     match event:
         case PointFinished():
             if "alpha_2" not in type(event.point).model_fields:
                 return None
             point = event.point.model_dump()
-            reason = one_line(str(point.get("reason") or ""))
-            text = Row.finished(point).sentence + (f" ({reason})" if reason else "")
+            remarks = _shortened(one_line(str(point.get("reason") or "")), set() if told is None else told)
+            text = Row.finished(point).sentence + (f" ({remarks})" if remarks else "")
             return Notice(event.time, event.notice, text, grave=point.get("status") == "overturned")
         case StateChanged(after=State.ABORTING | State.HALTED):
             return Notice(event.time, str(event.after), one_line(event.reason), grave=True)
         case _:
             return Notice(event.time, event.notice, one_line(event.line), grave=event.grave) if event.notice else None
+
+
+def _shortened(reason: str, told: set[str]) -> str:
+    remarks = reason.split("; ")
+    new = [each for each in remarks if each not in told]
+    told.update(each for each in new if len(each) >= LONG)
+    repeated = len(remarks) - len(new)
+    return "; ".join([*new, *([f"{counted(repeated, 'remark')} as before"] if repeated else [])])
 
 
 def twin_line(event: TwinEstimate) -> str:
@@ -177,6 +191,7 @@ class RunDisplay:
     """Whether the session is computing before the rig is opened or after it is closed."""
     _begun: float = 0.0
     _estimated_at: float = 0.0
+    _told: set[str] = field(default_factory=set[str])
 
     def prepare(self, phase: str, done: int, total: int) -> None:
         """Show a stage before the rig is opened or after it is closed; `done` of its `total` parts are complete."""
@@ -230,7 +245,7 @@ class RunDisplay:
                 self.running = None
             case _:
                 pass
-        notice = notice_of(event)
+        notice = notice_of(event, self._told)
         if notice is not None and not isinstance(event, PointFinished):
             self.notices.append(notice)
         return notice

@@ -106,6 +106,18 @@ def test_a_narrow_terminal_loses_no_number():
     assert line_with(lines, "0.5000 unstable", "overturned")
 
 
+def test_a_long_remark_is_written_out_for_the_first_point_that_has_it() -> None:
+    laser, others = "the linearity error of laser_1 " * 3, ("captured after cycle 40", "the motion differs")
+    points = [STEADY.model_copy(update={"reason": f"{other}; {laser}"}) for other in (*others, others[0])]
+    out = StringIO()
+    with PlainLines(out) as lines:
+        for point in points:
+            lines(PointFinished(point, time=1.0))
+    ends = [line[line.index("(") :] for line in out.getvalue().splitlines()]
+    assert ends[0] == f"({others[0]}; {laser.strip()})"
+    assert ends[1:] == [f"({other}; 1 remark as before)" for other in (others[1], others[0])]
+
+
 def test_many_points_leave_the_picture_within_the_terminal():
     events: list[Event] = [PointFinished(STEADY, time=0.0) for _ in range(60)]
     lines = rendered(scene_after([*CAMPAIGN, *events]), height=30)
