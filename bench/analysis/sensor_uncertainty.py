@@ -159,8 +159,9 @@ class SensorUncertainty:
         peaks, which are zero if the lasers are on the table.
         """
         errors = self.linearity(0, seen, draws)
-        weights = np.array([1.0, -1.0])
-        effects = [Effect(np.array([each.lasers[0], x]), weights) for each, x in zip(seen, table, strict=True)]
+        # errors that were found contain that of the reference sensor in the lasers
+        read = [(0.0 if self.curves is not None else each.lasers[0], x) for each, x in zip(seen, table, strict=True)]
+        effects = [Effect(np.array(both), np.array([1.0, -1.0])) for both in read]
         common = self._common(effects, shares_of(seen))
         return errors if common is None else errors + common.draws(draws.normal(len(seen)))
 
@@ -214,9 +215,10 @@ class SensorUncertainty:
         if self.curves is not None:
             limits = [self.accuracy.laser_linearity * whole for whole in self.ranges]
             bends = [self.curves.bend(laser) for laser in (0, 1)]
+            again = "measure it with" if self.calibration is None else "repeat"
             return tuple(
                 f"the linearity error of laser_{laser} is {1e3 * bend:.2f} mm; its data sheet allows {1e3 * limit:.2f} "
-                "mm (analysis.laser_linearity): check its mount, or measure it with `rockbench run laser-calibration`"
+                f"mm (analysis.laser_linearity): check its mount, or {again} `rockbench run laser-calibration`"
                 for laser, (bend, limit) in enumerate(zip(bends, limits, strict=True), 1)
                 if bend > EXCESS * limit
             )

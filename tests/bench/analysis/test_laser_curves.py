@@ -28,6 +28,17 @@ K, C = SPECIMEN.frame.k2 / SPECIMEN.frame.m2, SPECIMEN.frame.dashpots[1] / SPECI
 TIME = np.arange(round(24.0 * RATE)) / RATE
 GROUND, TABLE = (LinearFrame(SPECIMEN, grounded=grounded) for grounded in (True, False))
 
+AT_REST = PeakReadings(
+    drift=0.02,
+    sign=1.0,
+    lasers=(0.01, 0.03),
+    speeds=(0.0, 0.0),
+    zero=np.zeros((2, 1)),
+    swings=(0.01, 0.01),
+    at_rest=True,
+)
+"""A peak relative to the zero at rest."""
+
 Array = np.ndarray
 
 
@@ -311,20 +322,27 @@ def test_the_sensors_have_the_errors_of_the_tests_unless_these_tell_none() -> No
     left = calibrated.found_in([seen], GROUND, RATE, BLOCK).curves
     assert left is not None
     assert 0.0 < left.covariance[-1, -1] <= 1.01 * calibrated.mismatch**2 < 0.02 * plain.mismatch**2
-    readings = PeakReadings(
-        drift=0.02,
-        sign=1.0,
-        lasers=(0.01, 0.03),
-        speeds=(0.0, 0.0),
-        zero=np.zeros((2, 1)),
-        swings=(0.01, 0.01),
-        at_rest=True,
-    )
     draws = Draws(np.random.default_rng(1), 400)
-    errors = found.drift_errors([readings, readings], draws)
+    errors = found.drift_errors([AT_REST, AT_REST], draws)
     # the difference between the scales is one of the errors that were found
     assert SCALES not in errors
-    expected = found.curves.errors([(readings.effect(0).reversed, readings.effect(1))]).moments[0, 0] ** 0.5
+    expected = found.curves.errors([(AT_REST.effect(0).reversed, AT_REST.effect(1))]).moments[0, 0] ** 0.5
     assert np.std(errors[LINEARITY][0]) == pytest.approx(expected, rel=0.15)
     np.testing.assert_allclose(errors[LINEARITY][0], errors[LINEARITY][1], atol=1e-12)
-    assert found.u1_linearity([readings], [0.0], draws).shape == (1, 400)
+    assert found.u1_linearity([AT_REST], [0.0], draws).shape == (1, 400)
+
+
+def test_errors_that_were_found_contain_that_of_the_reference_sensor_in_the_lasers() -> None:
+    seen = signals(two_motions()[0], (curve(1.5, 1.0), curve(1.2, 2.0)), 1.5e-5)
+    coarse = calibration(-0.1, 0.1, common_linearity=1e-4)
+    found = SensorUncertainty(SensorAccuracy(), (WHOLE, WHOLE), coarse).found_in([seen], GROUND, RATE, BLOCK)
+    own, still, moved = (
+        np.std(errors(Draws(np.random.default_rng(1), 4000)))
+        for errors in (
+            lambda draws: found.linearity(0, [AT_REST], draws),
+            lambda draws: found.u1_linearity([AT_REST], [0.0], draws),
+            lambda draws: found.u1_linearity([AT_REST], [0.02], draws),
+        )
+    )
+    assert still == pytest.approx(own, rel=1e-9)
+    assert moved > own + 1e-5
