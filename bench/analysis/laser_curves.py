@@ -10,7 +10,8 @@ what the residuals of whole blocks contribute to what independent residuals woul
 correlated, count as noise.
 
 Equations relate the two lasers with each other: of errors in proportion to the reading they tell the difference only,
-which is that of the scales. What both have in common changes all drifts alike.
+which is that of the scales. What both have in common changes all drifts alike, and the residuals with them: readings
+that are all error would leave none. That is no sign of errors, so the common proportion has no part in the equations.
 """
 
 from collections.abc import Callable, Sequence
@@ -36,11 +37,6 @@ FEWEST = 4
 
 ROUNDING = 1e-10
 """Relative size of a combination below which it is due to rounding."""
-
-IMPOSSIBLE = 0.02
-"""Slope of a curve beyond which the curves explain the motion instead of its errors: readings that are all error would
-solve every equation exactly, which in long and weak motions seems more likely than noise.
-"""
 
 USEFUL, LIKELY = 1e-3, 1e-3
 """Smallest variance of an observation relative to its noise, and smallest weight of a pair relative to the largest,
@@ -106,8 +102,8 @@ def laser_curves(
     block: float,
 ) -> LaserCurves | None:
     """Curves according to the signals of `tests` with the same lasers, shape (n, len(SIGNALS)) each, of a `frame` with
-    or without block; None if no test has a strong motion that is long and complete enough, or if the motions do not
-    distinguish errors from noise.
+    or without block; None if no test has a strong motion that is long and complete enough, or if the motions tell
+    nothing of the errors.
 
     `limits` are the largest linearity errors and `ranges` the measuring ranges of the lasers [m]; `mismatch` is the
     standard uncertainty of the ratio of their scales. Residuals may be correlated within `block` seconds.
@@ -123,6 +119,9 @@ def laser_curves(
     rows, values = (np.concatenate([each[k] for each in found]) for k in (0, 1))
     removed = sum(each[2] for each in found)
     rows[:, -1] *= mismatch
+    # the readings themselves as errors: a row times them is its value
+    alike = np.concatenate((first, second, [0.0]))
+    rows -= np.outer(values, alike / (alike @ alike))
     priors = [
         prior(places, np.eye(places.size), places, np.eye(places.size), limit, whole)
         for places, limit, whole in zip((first, second), limits, ranges, strict=True)
@@ -131,12 +130,6 @@ def laser_curves(
     if not observed.values.size:
         return None
     mean, covariance = _posterior(observed, priors[0], priors[1])
-    curves = mean[: first.size], mean[first.size : -1]
-    if any(
-        abs(places @ each) > IMPOSSIBLE * (places @ places)
-        for places, each in zip((first, second), curves, strict=True)
-    ):
-        return None
     sizes = np.append(np.ones(mean.size - 1), mismatch)
     return LaserCurves(
         (first, second), sizes * mean, np.outer(sizes, sizes) * covariance, float(np.sqrt(np.mean(observed.noise**2)))

@@ -12,11 +12,13 @@ whatever table, first storey and block do. The readings r_1 and r_2 of lasers on
 which is due to their errors e_1(r_1) and e_2(r_2): the motion is its own reference. With lasers on the table, p times
 the acceleration of the table is added.
 
-The equations are filtered by 1 / (1 + p omega^2), which leaves the white noise of r_2 white, and limited to the band of
-the motion. What else may be in a residual has columns of its own, which are projected out: changes of p and q, the
-square and the cube of the drift (stiffness that is not constant), the sign of its rate (friction), an offset, the
-table's acceleration, and the delay between the lasers, which wanders with their free-running clocks. With the stiffness
-1 + b d + c d^2, errors of the drift count with its slope 1 + 2 b d + 3 c d^2.
+White noise of the readings, equal in both, has the spectrum |1 + i q omega - p omega^2|^2 + |1 + i q omega|^2 in the
+equations, least near the modes. They are divided by its root, neglecting q, so that their noise is white as well, and
+limited to the band of the motion. What else may be in a residual has columns of its own, which are projected out:
+changes of p and q, the square and the cube of the drift (stiffness that is not constant), the sign of its rate
+(friction), an offset, the table's acceleration, and the delay between the lasers, which wanders with their free-running
+clocks. With the stiffness 1 + b d + c d^2, errors of the drift count with its slope 1 + 2 b d + 3 c d^2, and so does
+noise: an equation has the weight 1 / (1 + |2 b d + 3 c d^2|).
 """
 
 from collections.abc import Callable, Sequence
@@ -39,12 +41,13 @@ BAND = 20.0
 INNER, KEPT = 10.0, 4
 """Lowest rate of the filtered signals, relative to `BAND`, and number of their samples for each equation."""
 
-EDGE = 12.0
-"""Time constants of the filter between an equation and the ends of the signals: errors there decay to 6e-6."""
-
-LONGEST, AROUND = 0.02, 8.0
-"""Longest gap in the readings that is bridged [s]; time constants of the filter around a longer one without equations.
+EDGE = 26.0
+"""Time constants sqrt(p) between an equation and the ends of the signals: errors there decay by exp(-0.455) in each, to
+7e-6.
 """
+
+LONGEST, AROUND = 0.02, 17.0
+"""Longest gap in the readings that is bridged [s]; time constants around a longer one without equations."""
 
 KNOTS = 1.0
 """Time between the values of the wandering delay, between which it is linear [s]."""
@@ -87,7 +90,9 @@ class StoreyMotion:
             )
         ).T
         values = steady + q * own[1] + p * own[2]
-        across = np.linalg.qr(np.concatenate((own[1:], self._delays(upper))).T).Q
+        weight = 1.0 / (1.0 + np.abs(stiffer[self.kept]))
+        rows, values = weight[:, None] * rows, weight * values
+        across = np.linalg.qr((weight * np.concatenate((own[1:], self._delays(upper)))).T).Q
         return rows - across @ (across.T @ rows), values - across @ (across.T @ values), across.shape[1]
 
     def _own(self) -> Array:
@@ -130,7 +135,8 @@ class StoreyMotion:
     def _filtered(self, values: Array, response: NDArray[np.complex128] | Array) -> Array:
         """`values`, shape (k, n), with a frequency `response` within the band, at the equations, shape (k, number)."""
         edge, size, s = self._edge, self._size, self._s
-        window = 1.0 / (1.0 + (s.imag / (2.0 * pi * BAND)) ** 8) / (1.0 + self.nominal * s.imag**2)
+        noise = np.sqrt((1.0 - self.nominal * s.imag**2) ** 2 + 1.0)
+        window = 1.0 / (1.0 + (s.imag / (2.0 * pi * BAND)) ** 8) / noise
         padded = np.pad(values, ((0, 0), (edge, size - edge - values.shape[1])), mode="edge")
         found = np.fft.irfft(np.fft.rfft(padded, axis=1) * (response * window), size, axis=1)
         return found[:, edge : edge + values.shape[1]][:, self.kept]

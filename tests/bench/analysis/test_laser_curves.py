@@ -200,6 +200,22 @@ def test_stiffness_that_is_not_constant_and_friction_cause_no_false_errors(
     assert np.sqrt(np.mean(np.square(off))) < 1.5
 
 
+def test_many_weak_motions_tell_the_errors_without_a_common_proportion() -> None:
+    """Drifts of up to 7 mm for 2 min: readings that are all error, which solve every equation, are no explanation."""
+    moved = motions(dict.fromkeys(range(1, 9), 0.003))
+    off = []
+    for phase in (1.0, 3.0, 4.0):
+        errors = curve(1.5, phase, 0.01), curve(1.2, phase + 1.0, 0.01)
+        found = found_in(*(signals(each, errors, 1.5e-5, k) for k, each in enumerate(moved)))
+        assert found is not None
+        raw, left, stated = peaks(found, [(each, signals(each, errors)) for each in moved[::3][:2]])
+        assert stated < 3e-4 < abs(raw)
+        off.append(left / stated)
+        alike = np.concatenate(found.places)
+        assert abs(alike @ found.mean[:-1]) < 4e-3 * (alike @ alike)
+    assert np.abs(off).max() < 2.0
+
+
 def test_a_delay_that_wanders_between_the_lasers_causes_no_false_errors() -> None:
     """A held reading of a laser at 4 kHz becomes older and younger by its period of 0.25 ms within 7 s."""
     moved, none = two_motions()[0], curve(0.0, 0.0)
