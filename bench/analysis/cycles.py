@@ -111,7 +111,7 @@ def fit_cycle(
         coefficients=coefficients,
         fundamental=coefficients[1] + 1j * coefficients[harmonics + 1],
         peak=_peak(waveform),
-        extreme=_extreme(values),
+        extreme=extremes(values),
         noise=np.sqrt(np.mean(residual**2, axis=0)),
         traces=traces,
         first=first,
@@ -148,7 +148,7 @@ def parabola(points: int) -> NDArray[np.float64]:
     return np.linalg.pinv(np.stack([np.ones_like(x), x, x**2], axis=1)).astype(np.float64)
 
 
-def _extreme(values: NDArray[np.float64]) -> NDArray[np.float64]:
+def extremes(values: NDArray[np.float64]) -> NDArray[np.float64]:
     """Largest magnitude of each column of samples, shape (n, m), smoothed by a parabola around it."""
     magnitude = np.abs(values)
     half = max(len(values) // (2 * SHARE), 1)

@@ -32,11 +32,14 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class UnsteadyPeaks:
-    """Largest drift within one period: smallest, mean and largest over all positions of the period."""
+    """Largest drift within one period: smallest, mean and largest over all positions of the period in the `used`
+    cycles.
+    """
 
     least: SteadyPeak
     mean: SteadyPeak
     greatest: SteadyPeak
+    used: tuple[Cycle, ...] = ()
 
 
 def unsteady_peaks(cycles: Sequence[Cycle], omega: float) -> UnsteadyPeaks:
@@ -64,6 +67,7 @@ def unsteady_peaks(cycles: Sequence[Cycle], omega: float) -> UnsteadyPeaks:
             greatest.seen(int(greatest.largest.argmax())),
             chosen,
         ),
+        used=tuple(cycles),
     )
 
 

@@ -7,8 +7,10 @@ from typing import Any
 
 from bench.analysis.free_motion import FreeMotion, Rate
 from bench.analysis.gain import Gain, SteadyPeak, gain, without_rounding
+from bench.analysis.linearity import LinearFrame
 from bench.analysis.sensor_uncertainty import SensorUncertainty
 from bench.analysis.uncertainty import plus_minus
+from bench.analysis.unsteady_correction import revealed
 from bench.prediction.bands import expanded_uncertainty
 from protocols.common.sine.settling import Held, Settled
 from protocols.harmonic.protocol import HarmonicPoint, PointStatus
@@ -41,7 +43,8 @@ class Conditions:
 
     `reference` is the bare frame's dwell at the same frequency, `known` the uncertainty of the `specimen`. Stability on
     the table is predicted with the model `shaker`, if there is one; `harmonics` is the number of harmonics of the
-    table's motion that are controlled.
+    table's motion that are controlled. In an unsteady motion, errors of the lasers are found according to the model of
+    the bare `frame`, with residuals that may be correlated for `block` seconds; not without a frame.
     """
 
     omega: float
@@ -51,6 +54,8 @@ class Conditions:
     sensors: SensorUncertainty
     shaker: Shaker | None = None
     harmonics: int = 1
+    frame: LinearFrame | None = None
+    block: float = 0.0
 
     def corrected(self, peak: SteadyPeak) -> SteadyPeak:
         """The peak without the rounding errors of calibrated lasers; of others, the linearity errors are larger."""
@@ -125,29 +130,30 @@ def judge(settled: Settled, conditions: Conditions, starts: int, held: Held | No
 
     If the motion is not steady or the orbit is unstable, stability is also predicted on the table. If the motion was
     then `held` on the rocking orbit, gain and comparison are for the held motion, and the free motion is described in
-    addition. Peaks measured by calibrated lasers are corrected, which takes up to half a second.
+    addition. Peaks measured by calibrated lasers and those of unsteady motions are corrected, which takes up to half a
+    second.
     """
     conditions = replace(conditions, reference=_corrected(conditions.reference, conditions))
-    settled = _corrected(settled, conditions)
-    peak, bare, shaker = settled.peak, conditions.reference.peak, conditions.shaker
+    settled, alone = _revealed(_corrected(settled, conditions), conditions)
+    peak, bare, shaker = settled.peak, alone.reference.peak, conditions.shaker
     branches = conditions.branches(peak)
     steady = settled.steadiness.steady
     name = (nearest_branch(branches, peak.drift, peak.u1) if steady else None) or _ROCKING
     status = (PointStatus.STEADY if name == _ROCKING else PointStatus.RESTING) if steady else PointStatus.MODULATED
     comparison = conditions.comparison(name, branches.get(name), peak)
     # an unsteady motion has the gain at the amplitude that occurred, which no branch describes
-    measured, agrees = comparison.compare(peak) if steady else (conditions.gain(peak), None)
+    measured, agrees = comparison.compare(peak) if steady else (alone.gain(peak), None)
     on_table = None
     if shaker is not None and _ROCKING in branches and not (steady and branches[name].stable):
         on_table = _table_multiplier(branches[_ROCKING], shaker, conditions.harmonics)
-    free = _free_fields(settled.motion, conditions)
+    free = _free_fields(settled.motion, alone)
     orbit: dict[str, Any] = {}
     if settled.orbit is not None:
         gained, same = comparison.compare(settled.orbit)
         orbit = {"alpha_2_orbit": gained.alpha_2, "alpha_2_orbit_uncertainty": gained.uncertainty, "orbit_agrees": same}
     remarks = (
         *_remarks(settled, conditions.reference, name, branches, agrees, on_table, free, orbit),
-        *conditions.sensors.rough(measured.shapes),
+        *alone.sensors.rough(measured.shapes),
     )
     point = HarmonicPoint(
         omega_rad_s=conditions.omega,
@@ -170,6 +176,20 @@ def judge(settled: Settled, conditions: Conditions, starts: int, held: Held | No
 def _corrected(settled: Settled, conditions: Conditions) -> Settled:
     """A dwell with its corrected peak if it is steady; the peaks of other motions are those of single cycles."""
     return replace(settled, peak=conditions.corrected(settled.peak)) if settled.steadiness.steady else settled
+
+
+def _revealed(settled: Settled, conditions: Conditions) -> tuple[Settled, Conditions]:
+    """An unsteady dwell without the errors of the lasers that it reveals, and the conditions of its gain; both as they
+    are if it reveals none, or if the peak was asked for in another way.
+    """
+    motion, reference, frame = settled.motion, conditions.reference, conditions.frame
+    if motion is None or frame is None or settled.peak.drift != motion.peaks.greatest.drift:
+        return settled, conditions
+    found = revealed(motion.peaks, reference.peak, conditions.sensors, frame, conditions.omega, conditions.block)
+    if found is None:
+        return settled, conditions
+    alone = replace(conditions, reference=replace(reference, peak=found.reference), sensors=found.sensors)
+    return replace(settled, peak=found.peaks.greatest, motion=replace(motion, peaks=found.peaks)), alone
 
 
 def _held_point(free: HarmonicPoint, held: Held, conditions: Conditions) -> HarmonicPoint:

@@ -168,7 +168,8 @@ class HarmonicPlan:
                 held = Held(None, "the block fell")
             known, sensors = self._configuration.known_on_table, self._sensors
             shaker, harmonics = self._configuration.simulated_shaker, self._parameters.harmonics
-            conditions = Conditions(omega, specimen, known, self._bare[omega], sensors, shaker, harmonics)
+            frame, block = linear_frame(self._configuration), self._parameters.laser_block or 0.0
+            conditions = Conditions(omega, specimen, known, self._bare[omega], sensors, shaker, harmonics, frame, block)
             point = judge(settled, conditions, tried, held)
             point = with_free_prediction(point, specimen, self._amplitude, self._configuration, harmonics)
             point = point.model_copy(update={"start_chance": start.chance})

@@ -53,6 +53,16 @@ class HarmonicParameters(SineParameters, HarmonicPoints):
         ge=0,
         le=1000,
     )
+    laser_block: float | None = quantity(
+        4.0,
+        "s",
+        "the errors of the lasers, or what a calibration leaves of them, are found from the motion of the second "
+        "storey where it is not steady, with residuals that may be correlated for this long; 0: as stated by the data "
+        "sheet, the tests of the bare frame or the calibration",
+        ge=0,
+        le=60,
+        usual=(0.5, 20.0),
+    )
 
 
 class PointStatus(StrEnum):

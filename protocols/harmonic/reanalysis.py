@@ -175,7 +175,8 @@ class HarmonicFollower:
         tried = self._tried(point)
         settled = self._settled(tried)
         held = None if tried.held is None else self._held(tried.held, point)
-        conditions = Conditions(omega, specimen, known, bare, sensors, shaker, harmonics)
+        frame, block = linear_frame(self._configuration), self._parameters.laser_block or 0.0
+        conditions = Conditions(omega, specimen, known, bare, sensors, shaker, harmonics, frame, block)
         found = judge(settled, conditions, point.starts_tried, held)
         found = with_free_prediction(found, specimen, self._amplitude, self._configuration, harmonics)
         return found.model_copy(update={"start_chance": point.start_chance})
