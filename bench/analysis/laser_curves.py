@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from bench.analysis.error_curve import likelihoods, prior
 from bench.analysis.linearity import Effect, LinearFrame, LinearityErrors
+from bench.analysis.signals import LASER_1, LASER_2
 from bench.analysis.storey_equations import KEPT, StoreyMotion, storey_motion
 
 Array = NDArray[np.float64]
@@ -111,8 +112,10 @@ def laser_curves(
     moved = [found for each in tests if (found := storey_motion(each, frame, sample_rate)) is not None]
     if not moved or 0.0 in limits:
         return None
+    # of a test that is too short too: its peaks are corrected as well
     first, second = (
-        _places(np.concatenate([each.readings[laser] for each in moved]), SPACING * ranges[laser]) for laser in (0, 1)
+        _places(np.concatenate([each[:, column] for each in tests]), SPACING * whole)
+        for column, whole in zip((LASER_1, LASER_2), ranges, strict=True)
     )
     bases = _basis(first), _basis(second)
     found = [each.equations(bases) for each in moved]
@@ -137,8 +140,10 @@ def laser_curves(
 
 
 def _places(readings: Array, spacing: float) -> Array:
-    """Readings at which a curve is described, over the span of the `readings` and beyond its ends [m]."""
-    low, high = float(readings.min()) - spacing, float(readings.max()) + spacing
+    """Readings at which a curve is described, over the span of the `readings` and beyond its ends [m]; NaN where they
+    are missing.
+    """
+    low, high = float(np.nanmin(readings)) - spacing, float(np.nanmax(readings)) + spacing
     return np.linspace(low, high, max(int(np.ceil((high - low) / spacing)) + 1, 6))
 
 

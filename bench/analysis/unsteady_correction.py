@@ -50,9 +50,9 @@ def revealed(
     mean peak would not have a smaller uncertainty, as after a weak motion, if cycles are missing, or for lasers on the
     table, whose equations need its acceleration.
     """
-    if not (block and frame.grounded and peaks.used) or len(uninterrupted(peaks.used)) > 1:
+    if not (block and frame.grounded and peaks.used and reference.used) or len(uninterrupted(peaks.used)) > 1:
         return None
-    tests = [_signals(each) for each in (peaks.used, reference.used) if each]
+    tests = [_signals(each) for each in (peaks.used, reference.used)]
     sample_rate = len(tests[0]) / len(peaks.used) * omega / tau
     found = sensors.found_in(tests, frame, sample_rate, block)
     if found.curves is None:

@@ -258,10 +258,16 @@ def test_missing_samples_are_bridged_and_a_motion_without_enough_of_them_tells_n
     assert found_in(many) is None
     assert found_in(np.zeros_like(seen)) is None
     assert found_in(seen[:3500]) is None
-    # a further test that tells nothing changes nothing
-    beside = found_in(seen, many)
+    # a further test that tells nothing changes nothing, and what is beyond the readings of the first stays uncertain
+    beside = found_in(seen, 2.0 * many)
     assert beside is not None
-    np.testing.assert_array_equal(beside.mean, whole.mean)
+    assert len(beside.mean) > len(whole.mean)
+    np.testing.assert_allclose(beside.expected(1, places), whole.expected(1, places), atol=1e-5)
+    near, far = (
+        np.sqrt(beside.errors([(None, Effect(np.array([0.0, x]), np.array([-1.0, 1.0])))]).moments[0, 0])
+        for x in (places[-1], beside.places[1][-1])
+    )
+    assert far > 1.5 * near
 
 
 def test_a_laser_that_errs_more_than_its_data_sheet_allows_is_named() -> None:

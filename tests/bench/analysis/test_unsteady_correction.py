@@ -1,0 +1,101 @@
+"""Unsteady peaks without the errors of the lasers, on exact motions of a second storey above a first one that beats."""
+
+from dataclasses import dataclass, replace
+from math import tau
+
+import numpy as np
+import pytest
+from numpy.lib.stride_tricks import sliding_window_view
+
+from bench.analysis.cycles import CycleAnalyser
+from bench.analysis.gain import SteadyPeak, gain, steady_peak
+from bench.analysis.linearity import LinearFrame
+from bench.analysis.sensor_accuracy import SensorAccuracy
+from bench.analysis.sensor_uncertainty import SensorUncertainty
+from bench.analysis.signals import DRIFT, LASER_1, LASER_2, SIGNALS
+from bench.analysis.unsteady_correction import Revealed, revealed
+from bench.analysis.unsteady_peaks import UnsteadyPeaks, unsteady_peaks
+from tests.bench.analysis.test_laser_curves import BLOCK, GROUND, RATE, TABLE, WHOLE, C, K, curve
+
+OMEGA, CYCLES, STEP, NOISE = 12.5, 96, 5e-5, 5e-6
+SENSORS = SensorUncertainty(SensorAccuracy(), (WHOLE, WHOLE))
+Array = np.ndarray
+
+
+@dataclass(frozen=True)
+class Test:
+    """An unsteady test and the steady one of the bare frame as measured, and the true drift of both [m]."""
+
+    __test__ = False
+
+    peaks: UnsteadyPeaks
+    bare: SteadyPeak
+    drift: Array
+    bare_drift: Array
+
+    def revealed(self, *, frame: LinearFrame = GROUND, block: float = BLOCK) -> Revealed | None:
+        return revealed(self.peaks, self.bare, SENSORS, frame, OMEGA, block)
+
+    @property
+    def gains(self) -> list[float]:
+        """True gains of the least, the mean and the greatest peak."""
+        largest = sliding_window_view(np.abs(self.drift), round(tau / OMEGA * RATE)).max(axis=1)
+        bare = np.abs(self.bare_drift).max()
+        return [float(each / bare) for each in (largest.min(), largest.mean(), largest.max())]
+
+
+def beating(number: int, size: float = 0.012) -> Test:
+    """The first storey moves by `size` [m] and beats with several lines; lasers with errors, steps and noise."""
+    random = np.random.default_rng(number)
+    errors = [curve(waves, phase) for waves, phase in zip((1.5, 1.2), random.uniform(0.0, tau, 2), strict=True)]
+    # the storeys come to rest within one step
+    rest = random.uniform(-0.5 * STEP, 0.5 * STEP, 2)
+    found = list[tuple[Array, Array]]()
+    lines = ((OMEGA, size), (OMEGA * 8.0 / 9.0, size / 2.0), (OMEGA * 10.0 / 9.0, size / 3.0), (19.4, size / 4.0))
+    for parts in (lines, ((OMEGA, 0.018),)):
+        time = np.arange(round(CYCLES * tau / OMEGA * RATE) + 1) / RATE
+        moving = [(omega, amplitude * np.exp(1j * omega * time)) for omega, amplitude in parts]
+        first = sum(np.imag(each) for _, each in moving)
+        second = sum(
+            np.imag((1.0 + 1j * omega * C / K) / (1.0 + 1j * omega * C / K - omega**2 / K) * each)
+            for omega, each in moving
+        )
+        signals = np.zeros((time.size, len(SIGNALS) + 1))
+        for column, storey, error, offset in zip((LASER_1, LASER_2), (first, second), errors, rest, strict=True):
+            seen = storey + error(storey) + offset + NOISE * random.standard_normal(time.size)
+            signals[:, column] = STEP * np.round(seen / STEP)
+        signals[:, DRIFT] = signals[:, LASER_2] - signals[:, LASER_1]
+        found.append((signals, second - first))
+    cycles, bare = (CycleAnalyser(OMEGA, RATE, 0).push(signals) for signals, _ in found)
+    return Test(unsteady_peaks(cycles, OMEGA), steady_peak(bare[-24:], OMEGA), found[0][1], found[1][1])
+
+
+@pytest.mark.parametrize("draws", [4, pytest.param(40, marks=pytest.mark.soak)])
+def test_gains_of_a_beating_motion_have_small_errors_as_large_as_stated(draws: int) -> None:
+    before, after, stated = [], [], []
+    for number in range(draws):
+        test = beating(number)
+        found = test.revealed()
+        assert found is not None
+        names = ("least", "mean", "greatest")
+        plain = [gain(getattr(test.peaks, name), test.bare, SENSORS) for name in names]
+        better = [gain(getattr(found.peaks, name), found.reference, found.sensors) for name in names]
+        before.append([each.alpha_2 / true - 1.0 for each, true in zip(plain, test.gains, strict=True)])
+        after.append([each.alpha_2 / true - 1.0 for each, true in zip(better, test.gains, strict=True)])
+        stated.append([0.5 * each.uncertainty / each.alpha_2 for each in better])
+        assert all(one.uncertainty < 0.3 * other.uncertainty for one, other in zip(better, plain, strict=True))
+    rms = [np.sqrt(np.mean(np.square(each), axis=0)) for each in (before, after, np.array(after) / np.array(stated))]
+    assert (rms[1] < 0.7 * rms[0]).all()
+    # the least peak is a tenth of the greatest
+    assert (rms[1][1:] < (3e-4, 1e-3)).all()
+    assert (rms[2] < 1.5).all()
+
+
+def test_where_nothing_is_gained_nothing_is_corrected() -> None:
+    test = beating(1)
+    assert test.revealed(block=0.0) is None
+    assert test.revealed(frame=TABLE) is None
+    gap = replace(test.peaks, used=(*test.peaks.used[:40], *test.peaks.used[41:]))
+    assert replace(test, peaks=gap).revealed() is None
+    assert replace(test, peaks=replace(test.peaks, used=())).revealed() is None
+    assert replace(test, bare=replace(test.bare, used=())).revealed() is None
