@@ -185,7 +185,8 @@ def _revealed(settled: Settled, conditions: Conditions) -> tuple[Settled, Condit
     motion, reference, frame = settled.motion, conditions.reference, conditions.frame
     if motion is None or frame is None or settled.peak.drift != motion.peaks.greatest.drift:
         return settled, conditions
-    found = revealed(motion.peaks, reference.peak, conditions.sensors, frame, conditions.omega, conditions.block)
+    how = conditions.sensors, frame, conditions.omega, conditions.block
+    found = revealed(motion.peaks, reference.peak, reference.constant, *how)
     if found is None:
         return settled, conditions
     alone = replace(conditions, reference=replace(reference, peak=found.reference), sensors=found.sensors)
