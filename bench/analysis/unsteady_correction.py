@@ -39,22 +39,20 @@ class Revealed:
 def revealed(
     peaks: UnsteadyPeaks,
     reference: SteadyPeak,
-    bare: Sequence[Cycle],
     sensors: SensorUncertainty,
     frame: LinearFrame,
     omega: float,
     block: float,
 ) -> Revealed | None:
-    """Corrected peaks of a motion at `omega` [rad/s] of a `frame` with a block, relative to a `reference` without it,
-    which the last of the `bare` cycles have.
+    """Corrected peaks of a motion at `omega` [rad/s] of a `frame` with a block, relative to a `reference` without it.
 
     Residuals of the equations may be correlated within `block` seconds; zero corrects nothing. None if the gain of the
     mean peak would not have a smaller uncertainty, as after a weak motion, if cycles are missing, or for lasers on the
     table, whose equations need its acceleration.
     """
-    if not (block and frame.grounded and peaks.used and bare) or len(uninterrupted(peaks.used)) > 1:
+    if not (block and frame.grounded and peaks.used and reference.used) or len(uninterrupted(peaks.used)) > 1:
         return None
-    tests = [_signals(each) for each in (peaks.used, uninterrupted(bare)[-1])]
+    tests = [_signals(each) for each in (peaks.used, reference.used)]
     sample_rate = len(tests[0]) / len(peaks.used) * omega / tau
     found = sensors.found_in(tests, frame, sample_rate, block)
     if found.curves is None:

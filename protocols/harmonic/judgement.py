@@ -185,8 +185,7 @@ def _revealed(settled: Settled, conditions: Conditions) -> tuple[Settled, Condit
     motion, reference, frame = settled.motion, conditions.reference, conditions.frame
     if motion is None or frame is None or settled.peak.drift != motion.peaks.greatest.drift:
         return settled, conditions
-    how = conditions.sensors, frame, conditions.omega, conditions.block
-    found = revealed(motion.peaks, reference.peak, reference.constant, *how)
+    found = revealed(motion.peaks, reference.peak, conditions.sensors, frame, conditions.omega, conditions.block)
     if found is None:
         return settled, conditions
     alone = replace(conditions, reference=replace(reference, peak=found.reference), sensors=found.sensors)

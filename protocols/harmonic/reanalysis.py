@@ -234,7 +234,6 @@ class HarmonicFollower:
             series.updates,
             motion,
             None if motion is None else orbit_peak(constant, motion, omega),
-            constant=(*before, *used) if steadiness.steady else (),
         )
 
 

@@ -46,8 +46,7 @@ class Settled:
     """A measured dwell: its peak, its steadiness, and its settling `time` [s]. `amplitude_error` (relative) and
     `phase_error` [rad] are errors of the table, after `updates` corrections of its drive. `motion` describes an
     unsteady motion; if that revolves about a periodic motion, `orbit` is the peak of its mean cycle. `table` is the
-    state of the table at the end of the dwell, None if unknown. `constant` are the cycles of a steady dwell since the
-    last correction of its drive.
+    state of the table at the end of the dwell, None if unknown.
     """
 
     peak: SteadyPeak
@@ -59,7 +58,6 @@ class Settled:
     motion: FreeMotion | None = None
     orbit: SteadyPeak | None = None
     table: TableState | None = None
-    constant: tuple[Cycle, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -163,9 +161,8 @@ def settle_and_measure(
                 used = cycles[-parameters.measured_cycles :]
                 table = SineResponse.of(used, sine, turn)
                 motion = orbit = None
-                before = preceding(list(constant), used) if steadiness.steady else ()
                 if steadiness.steady:
-                    peak = steady_peak(used, sine.omega, before=before, frame=frame)
+                    peak = steady_peak(used, sine.omega, before=preceding(list(constant), used), frame=frame)
                     measurements += 1
                     again = waiting is not None and not over and measurements < MOST and waiting(peak)
                 else:
@@ -176,8 +173,7 @@ def settle_and_measure(
                 state = TableState(turn, drive, complex(table.achieved[0] / table.played[0]))
                 errors = table.amplitude_error, table.phase_error
                 if not again:
-                    whole = (*before, *used) if steadiness.steady else ()
-                    return Settled(peak, steadiness, waited, *errors, updates, motion, orbit, state, whole)
+                    return Settled(peak, steadiness, waited, *errors, updates, motion, orbit, state)
         recent.extend(cycles)
         yield from report(list(recent))
         over = waited >= limit

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.lib.stride_tricks import sliding_window_view
 
-from bench.analysis.cycles import Cycle, CycleAnalyser
+from bench.analysis.cycles import CycleAnalyser
 from bench.analysis.gain import SteadyPeak, gain, steady_peak
 from bench.analysis.linearity import LinearFrame
 from bench.analysis.sensor_accuracy import SensorAccuracy
@@ -30,12 +30,11 @@ class Test:
 
     peaks: UnsteadyPeaks
     bare: SteadyPeak
-    cycles: list[Cycle]
     drift: Array
     bare_drift: Array
 
     def revealed(self, *, frame: LinearFrame = GROUND, block: float = BLOCK) -> Revealed | None:
-        return revealed(self.peaks, self.bare, self.cycles, SENSORS, frame, OMEGA, block)
+        return revealed(self.peaks, self.bare, SENSORS, frame, OMEGA, block)
 
     @property
     def gains(self) -> list[float]:
@@ -68,7 +67,7 @@ def beating(number: int, size: float = 0.012) -> Test:
         signals[:, DRIFT] = signals[:, LASER_2] - signals[:, LASER_1]
         found.append((signals, second - first))
     cycles, bare = (CycleAnalyser(OMEGA, RATE, 0).push(signals) for signals, _ in found)
-    return Test(unsteady_peaks(cycles, OMEGA), steady_peak(bare[-24:], OMEGA), bare[-48:], found[0][1], found[1][1])
+    return Test(unsteady_peaks(cycles, OMEGA), steady_peak(bare[-24:], OMEGA), found[0][1], found[1][1])
 
 
 @pytest.mark.parametrize("draws", [4, pytest.param(40, marks=pytest.mark.soak)])
@@ -99,4 +98,4 @@ def test_where_nothing_is_gained_nothing_is_corrected() -> None:
     gap = replace(test.peaks, used=(*test.peaks.used[:40], *test.peaks.used[41:]))
     assert replace(test, peaks=gap).revealed() is None
     assert replace(test, peaks=replace(test.peaks, used=())).revealed() is None
-    assert replace(test, cycles=[]).revealed() is None
+    assert replace(test, bare=replace(test.bare, used=())).revealed() is None
