@@ -208,10 +208,12 @@ def _held_point(free: HarmonicPoint, held: Held, conditions: Conditions) -> Harm
     captured = f"captured after cycle {held.captured}" + (" without a model" if held.model_free else "")
     remarks.append(f"{captured}, control {100.0 * held.control:.2g} % of the amplitude (rms)")
     remarks += [*_amplitude_remark(held), *([DIFFERS] if agrees is False else [])]
+    remarks += [each for each in conditions.sensors.rough(measured.shapes) if each not in free.reason]
     return free.model_copy(
         update={
             "status": PointStatus.HELD,
             **comparison.fields(peak, measured, agrees, held),
+            "bare_drift_peak_m": conditions.reference.peak.drift,
             **_rate_fields(held.rate),
             "control_share": held.control,
             "captured_cycles": held.captured,

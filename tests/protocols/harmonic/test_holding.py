@@ -51,6 +51,7 @@ def test_the_unstable_orbit_is_held_and_its_gain_agrees(held: dict[str, Any]) ->
     assert held["status"] == "held", held["reason"]
     assert held["agrees"] is True
     assert held["alpha_2"] == pytest.approx(held["alpha_2_predicted"], rel=0.01)
+    assert held["alpha_2"] == pytest.approx(held["drift_peak_m"] / held["bare_drift_peak_m"], rel=1e-9)
     assert held["control_share"] < 1e-3
     assert held["captured_cycles"] < 200
     assert held["predicted_stable"] is False
@@ -102,3 +103,4 @@ def test_without_a_hold_only_the_free_motion_is_measured(tmp_path: Path) -> None
     assert free["status"] == "modulated"
     assert free["control_share"] is None
     assert free["alpha_2"] == free["alpha_2_greatest"]
+    assert free["alpha_2"] == pytest.approx(free["drift_peak_m"] / free["bare_drift_peak_m"], rel=1e-9)
