@@ -219,6 +219,15 @@ def handle_signals(interrupts: Interrupts) -> None:
         signal.signal(number, interrupts)
 
 
+def converted(error: BaseException) -> bool:
+    """Whether native code has turned an interrupt into this `error`, as h5py's locks (SystemError) and numba's imports
+    (ImportError) do. The first names its cause, the second does not.
+    """
+    handler = signal.getsignal(signal.SIGINT)
+    answered = isinstance(handler, Interrupts) and handler.first is not None
+    return answered or isinstance(error.__cause__, KeyboardInterrupt)
+
+
 def interrupted_text(text: str = "interrupted", otherwise: str = "") -> str:
     """Message for an interrupt: `text` and the complete result files or, if there are none, `otherwise`."""
     kept = ", ".join(map(str, completed()))

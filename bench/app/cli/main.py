@@ -8,7 +8,7 @@ from pathlib import Path
 
 from cyclopts import App, CycloptsError, UnusedCliTokensError
 
-from bench.app.cli.interrupt import report_interrupt
+from bench.app.cli.interrupt import converted, report_interrupt
 from bench.app.cli.output import reply_in_json, report_error
 from bench.progress import Progress, silent
 from bench.unfinished import forget_completed
@@ -287,9 +287,8 @@ def main(argv: Sequence[str] | None = None, progress: Progress = silent) -> int:
         report_interrupt(str(interrupt) or None)
         return 130
     except Exception as error:
-        if isinstance(error.__cause__, KeyboardInterrupt):
-            # compiled code, such as a lock of h5py, turns the interrupt into a SystemError
-            report_interrupt(str(error.__cause__) or None)
+        if converted(error):
+            report_interrupt(str(error.__cause__ or "") or None)
             return 130
         # damaged contents may cause any exception
         if isinstance(error, OSError) or not reads_files(arguments):

@@ -7,9 +7,11 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
+from bench.app.cli.interrupt import Interrupts
 from bench.app.cli.main import main
 from bench.datafile.recorder import Recorder
 from bench.events import Event, PointFinished
@@ -45,6 +47,31 @@ def test_an_interrupt_inside_compiled_code_is_not_blamed_on_the_file(
     file.touch()
     assert main(["export", str(file), "--to", "csv", "--out", str(tmp_path / "new")]) == 130
     assert capsys.readouterr().err == "rockbench: error: interrupted\n"
+
+
+@pytest.mark.parametrize("answered", [True, False])
+def test_an_error_that_native_code_makes_of_an_interrupt_is_none_of_the_file(
+    answered: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """numba's C code raises ImportError when Ctrl-C ends its import of a module."""
+
+    def command() -> int:
+        raise ImportError("numba._devicearray failed to import")
+
+    parsed = command, SimpleNamespace(args=(), kwargs={}), {}
+    monkeypatch.setattr(
+        "bench.app.cli.main.rockbench_app", lambda _: SimpleNamespace(parse_args=lambda *_, **__: parsed)
+    )
+    handler = Interrupts()
+    handler.first = signal.SIGINT if answered else None
+    before = signal.signal(signal.SIGINT, handler)
+    try:
+        code = main(["report", "campaign.h5"])
+    finally:
+        signal.signal(signal.SIGINT, before)
+    said = capsys.readouterr().err
+    assert (code, "damaged" in said or "cannot be evaluated" in said) == ((130, False) if answered else (1, True))
+    assert said.startswith("rockbench: error: interrupted") is answered
 
 
 def test_a_complete_result_is_kept_and_named(
