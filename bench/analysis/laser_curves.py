@@ -112,7 +112,7 @@ def laser_curves(
     moved = [found for each in tests if (found := storey_motion(each, frame, sample_rate)) is not None]
     if not moved or 0.0 in limits:
         return None
-    # of a test that is too short too: its peaks are corrected as well
+    # also those of tests without equations, whose peaks are corrected as well
     first, second = (
         _places(np.concatenate([each[:, column] for each in tests]), SPACING * whole)
         for column, whole in zip((LASER_1, LASER_2), ranges, strict=True)

@@ -132,13 +132,18 @@ class StoreyMotion:
     def _s(self) -> NDArray[np.complex128]:
         return np.asarray(2.0j * pi * np.fft.rfftfreq(self._size, 1.0 / self.rate), dtype=np.complex128)
 
+    @cached_property
+    def _window(self) -> Array:
+        """Response that limits the band and makes the noise of the readings white."""
+        square = self._s.imag**2
+        noise = np.sqrt((1.0 - self.nominal * square) ** 2 + 1.0)
+        return np.asarray(1.0 / (1.0 + (self._s.imag / (2.0 * pi * BAND)) ** 8) / noise)
+
     def _filtered(self, values: Array, response: NDArray[np.complex128] | Array) -> Array:
         """`values`, shape (k, n), with a frequency `response` within the band, at the equations, shape (k, number)."""
-        edge, size, s = self._edge, self._size, self._s
-        noise = np.sqrt((1.0 - self.nominal * s.imag**2) ** 2 + 1.0)
-        window = 1.0 / (1.0 + (s.imag / (2.0 * pi * BAND)) ** 8) / noise
+        edge, size = self._edge, self._size
         padded = np.pad(values, ((0, 0), (edge, size - edge - values.shape[1])), mode="edge")
-        found = np.fft.irfft(np.fft.rfft(padded, axis=1) * (response * window), size, axis=1)
+        found = np.fft.irfft(np.fft.rfft(padded, axis=1) * (response * self._window), size, axis=1)
         return found[:, edge : edge + values.shape[1]][:, self.kept]
 
 

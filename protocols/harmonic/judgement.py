@@ -11,9 +11,10 @@ from bench.analysis.linearity import LinearFrame
 from bench.analysis.sensor_uncertainty import SensorUncertainty
 from bench.analysis.uncertainty import plus_minus
 from bench.analysis.unsteady_correction import revealed
+from bench.config.model import BenchConfiguration
 from bench.prediction.bands import expanded_uncertainty
-from protocols.common.sine.settling import Held, Settled
-from protocols.harmonic.protocol import HarmonicPoint, PointStatus
+from protocols.common.sine.settling import Held, Settled, linear_frame
+from protocols.harmonic.protocol import HarmonicParameters, HarmonicPoint, PointStatus
 from sim.gain import Branch, nearest_branch, predict_gain
 from sim.knowledge import SpecimenKnowledge
 from sim.shaker import Shaker
@@ -56,6 +57,29 @@ class Conditions:
     harmonics: int = 1
     frame: LinearFrame | None = None
     block: float = 0.0
+
+    @classmethod
+    def of(
+        cls,
+        omega: float,
+        specimen: Specimen,
+        reference: Settled,
+        sensors: SensorUncertainty,
+        configuration: BenchConfiguration,
+        parameters: HarmonicParameters,
+    ) -> "Conditions":
+        """Conditions on the bench of `configuration`, with the `parameters` of the run."""
+        return cls(
+            omega,
+            specimen,
+            configuration.known_on_table,
+            reference,
+            sensors,
+            configuration.simulated_shaker,
+            parameters.harmonics,
+            linear_frame(configuration),
+            parameters.laser_block or 0.0,
+        )
 
     def corrected(self, peak: SteadyPeak) -> SteadyPeak:
         """The peak without the rounding errors of calibrated lasers; of others, the linearity errors are larger."""

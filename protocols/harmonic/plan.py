@@ -166,12 +166,10 @@ class HarmonicPlan:
             yield from end_test(specimen, fast=isinstance(held, Fallen) or (held is not None and held.fallen))
             if isinstance(held, Fallen):
                 held = Held(None, "the block fell")
-            known, sensors = self._configuration.known_on_table, self._sensors
-            shaker, harmonics = self._configuration.simulated_shaker, self._parameters.harmonics
-            frame, block = linear_frame(self._configuration), self._parameters.laser_block or 0.0
-            conditions = Conditions(omega, specimen, known, self._bare[omega], sensors, shaker, harmonics, frame, block)
-            point = judge(settled, conditions, tried, held)
-            point = with_free_prediction(point, specimen, self._amplitude, self._configuration, harmonics)
+            configuration, parameters = self._configuration, self._parameters
+            tested = omega, specimen, self._bare[omega], self._sensors
+            point = judge(settled, Conditions.of(*tested, configuration, parameters), tried, held)
+            point = with_free_prediction(point, specimen, self._amplitude, configuration, parameters.harmonics)
             point = point.model_copy(update={"start_chance": start.chance})
             if point.status in (PointStatus.STEADY, PointStatus.HELD) or not point.predicted_stable:
                 return point

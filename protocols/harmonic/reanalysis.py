@@ -162,23 +162,20 @@ class HarmonicFollower:
     def _recomputed(self, point: HarmonicPoint) -> HarmonicPoint:
         omega = point.omega_rad_s
         specimen = self._configuration.known_specimen.coupled(point.beta)
-        known = self._configuration.known_on_table
         bare = self._bare[omega]
         if point.status is PointStatus.OVERTURNED:
             asked = self._amplitude
             branch = predict_gain(specimen, omega, asked, bare.peak.amplitude).rocking
+            predicted = predicted_fields("rocking", branch, self._configuration.known_on_table)
             peaks = {"bare_drift_peak_m": bare.peak.drift, "bare_amplitude_m_s2": bare.peak.amplitude}
-            return point.model_copy(update=predicted_fields("rocking", branch, known) | peaks)
+            return point.model_copy(update=predicted | peaks)
         sensors = checked(self._configuration.sensors, self._bare.values())
-        shaker = self._configuration.simulated_shaker
-        harmonics = self._parameters.harmonics
         tried = self._tried(point)
         settled = self._settled(tried)
         held = None if tried.held is None else self._held(tried.held, point)
-        frame, block = linear_frame(self._configuration), self._parameters.laser_block or 0.0
-        conditions = Conditions(omega, specimen, known, bare, sensors, shaker, harmonics, frame, block)
+        conditions = Conditions.of(omega, specimen, bare, sensors, self._configuration, self._parameters)
         found = judge(settled, conditions, point.starts_tried, held)
-        found = with_free_prediction(found, specimen, self._amplitude, self._configuration, harmonics)
+        found = with_free_prediction(found, specimen, self._amplitude, self._configuration, self._parameters.harmonics)
         return found.model_copy(update={"start_chance": point.start_chance})
 
     def _tried(self, point: HarmonicPoint) -> _Series:

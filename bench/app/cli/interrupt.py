@@ -219,13 +219,14 @@ def handle_signals(interrupts: Interrupts) -> None:
         signal.signal(number, interrupts)
 
 
-def converted(error: BaseException) -> bool:
-    """Whether native code has turned an interrupt into this `error`, as h5py's locks (SystemError) and numba's imports
-    (ImportError) do. The first names its cause, the second does not.
+def converted(error: BaseException) -> KeyboardInterrupt | None:
+    """The interrupt that native code has turned into this `error`, as h5py's locks (SystemError, with its cause) and
+    numba's imports (ImportError, without) do; None if there was none.
     """
+    if isinstance(error.__cause__, KeyboardInterrupt):
+        return error.__cause__
     handler = signal.getsignal(signal.SIGINT)
-    answered = isinstance(handler, Interrupts) and handler.first is not None
-    return answered or isinstance(error.__cause__, KeyboardInterrupt)
+    return KeyboardInterrupt() if isinstance(handler, Interrupts) and handler.first is not None else None
 
 
 def interrupted_text(text: str = "interrupted", otherwise: str = "") -> str:

@@ -287,8 +287,8 @@ def main(argv: Sequence[str] | None = None, progress: Progress = silent) -> int:
         report_interrupt(str(interrupt) or None)
         return 130
     except Exception as error:
-        if converted(error):
-            report_interrupt(str(error.__cause__ or "") or None)
+        if (interrupt := converted(error)) is not None:
+            report_interrupt(str(interrupt) or None)
             return 130
         # damaged contents may cause any exception
         if isinstance(error, OSError) or not reads_files(arguments):

@@ -1,6 +1,6 @@
 """Error curves of the lasers from the motion of the second storey, on motions that another solver made."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from math import tau
@@ -133,6 +133,16 @@ def peaks(found: LaserCurves, tests: list[tuple[Motion, Array]]) -> tuple[float,
     moments = found.errors(effects).moments
     stated = float(np.sqrt(moments[0, 0] + moments[1, 1] - 2.0 * moments[0, 1]))
     return raw[1] - raw[0], corrected[1] - corrected[0], stated
+
+
+def above_sines(parts: Sequence[tuple[float, float]], time: Array) -> tuple[Array, Array]:
+    """Displacements [m] of a first storey that is a sum of sines, given by omega [rad/s] and size [m], and of the
+    second one in the steady state.
+    """
+    moving = [(1.0 + 1j * omega * C / K, omega**2 / K, size * np.exp(1j * omega * time)) for omega, size in parts]
+    first = sum(np.imag(each) for _, _, each in moving)
+    second = sum(np.imag(one / (one - bending) * each) for one, bending, each in moving)
+    return np.asarray(first), np.asarray(second)
 
 
 @cache
@@ -317,10 +327,7 @@ def test_a_long_and_weak_motion_is_not_taken_for_an_error(modulated: float) -> N
     """48 s with a drift of 7 mm: readings that are all error would solve every equation exactly."""
     time = np.arange(round(48.0 * RATE)) / RATE
     parts = (12.5, 4.5e-3), (13.2, -2.25e-3 * modulated), (11.8, 2.25e-3 * modulated)
-    moving = [(omega, size * np.exp(1j * omega * time)) for omega, size in parts]
-    first = sum(np.imag(each) for _, each in moving)
-    coupled = [(1.0 + 1j * omega * C / K, omega**2 / K, each) for omega, each in moving]
-    second = sum(np.imag(one / (one - bending) * each) for one, bending, each in coupled)
+    first, second = above_sines(parts, time)
     random = np.random.default_rng(1)
     seen = np.zeros((time.size, len(SIGNALS)))
     seen[:, ACCELERATION] = np.gradient(np.gradient(0.5 * first, time), time)

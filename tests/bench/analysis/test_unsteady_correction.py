@@ -15,7 +15,7 @@ from bench.analysis.sensor_uncertainty import SensorUncertainty
 from bench.analysis.signals import DRIFT, LASER_1, LASER_2, SIGNALS
 from bench.analysis.unsteady_correction import Revealed, revealed
 from bench.analysis.unsteady_peaks import UnsteadyPeaks, unsteady_peaks
-from tests.bench.analysis.test_laser_curves import BLOCK, GROUND, RATE, TABLE, WHOLE, C, K, curve
+from tests.bench.analysis.test_laser_curves import BLOCK, GROUND, RATE, TABLE, WHOLE, above_sines, curve
 
 OMEGA, CYCLES, STEP, NOISE = 12.5, 96, 5e-5, 5e-6
 SENSORS = SensorUncertainty(SensorAccuracy(), (WHOLE, WHOLE))
@@ -54,12 +54,7 @@ def beating(number: int, size: float = 0.012) -> Test:
     lines = ((OMEGA, size), (OMEGA * 8.0 / 9.0, size / 2.0), (OMEGA * 10.0 / 9.0, size / 3.0), (19.4, size / 4.0))
     for parts in (lines, ((OMEGA, 0.018),)):
         time = np.arange(round(CYCLES * tau / OMEGA * RATE) + 1) / RATE
-        moving = [(omega, amplitude * np.exp(1j * omega * time)) for omega, amplitude in parts]
-        first = sum(np.imag(each) for _, each in moving)
-        second = sum(
-            np.imag((1.0 + 1j * omega * C / K) / (1.0 + 1j * omega * C / K - omega**2 / K) * each)
-            for omega, each in moving
-        )
+        first, second = above_sines(parts, time)
         signals = np.zeros((time.size, len(SIGNALS) + 1))
         for column, storey, error, offset in zip((LASER_1, LASER_2), (first, second), errors, rest, strict=True):
             seen = storey + error(storey) + offset + NOISE * random.standard_normal(time.size)
