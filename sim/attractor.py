@@ -51,8 +51,8 @@ states.
 class Attractor:
     """Long-term motion: `peaks` of u1 and drift [m] in each of the last `KEPT` cycles, shape (KEPT, 2), and `within`,
     the smallest, mean and largest value of the largest drift [m] within a period that slides over these cycles.
-    `fallen` is the number of cycles before the block fell, in which case `peaks` has no rows, and `within` is NaN; None
-    if it did not fall.
+    `fallen` is the number of cycles before the block fell, None if it did not fall. If it fell, `peaks` has no rows,
+    and `within` describes the last `KEPT` cycles before; NaN if there were fewer.
     """
 
     peaks: Array
@@ -87,16 +87,22 @@ def attractor(specimen: Specimen, shaker: Shaker, orbit: TableOrbit, cycles: int
     for cycle in range(cycles):
         mode, samples = period.advance(mode, y, carried, commands)
         if mode == FALLEN:
-            return Attractor(np.empty((0, 2)), (nan, nan, nan), cycle)
+            before = _within(drifts, cycle) if cycle >= KEPT else (nan, nan, nan)
+            return Attractor(np.empty((0, 2)), before, cycle)
         drift = drifts[cycle % KEPT] = np.abs(samples[:, 3] - samples[:, 2])
         peaks[cycle] = np.abs(samples[:, 2]).max(), drift.max()
         mean += harmonics_of(samples[:, -1], drive.size) / CONTROLLED
         if (cycle + 1) % CONTROLLED == 0:
             drive = drive + SHARE * (orbit.acceleration - mean) * response
             commands, mean = period.commands(drive), np.zeros(drive.size, dtype=np.complex128)
+    return Attractor(peaks[-KEPT:], _within(drifts, cycles))
+
+
+def _within(drifts: Array, cycles: int) -> tuple[float, float, float]:
+    """Smallest, mean and largest value of the largest drift [m] within a period, for the last of so many `cycles`."""
     last = np.roll(drifts, -cycles, axis=0) if cycles > KEPT else drifts[:cycles]
-    within = largest_within(last.ravel(), TICKS)
-    return Attractor(peaks[-KEPT:], (float(within.min()), float(within.mean()), float(within.max())))
+    found = largest_within(last.ravel(), TICKS)
+    return float(found.min()), float(found.mean()), float(found.max())
 
 
 def largest_within(values: Array, length: int) -> Array:

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import nan
+from math import isfinite, nan
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,8 +45,9 @@ class LongTerm:
     does not repeat, or if the block falls. `gains`, shape (n,), are the gains of the peaks of the last cycles, without
     entries if the block falls, which happens after `fallen` cycles. `least`, `mean` and `greatest` are the gains of the
     largest drift within a period that slides over these cycles, NaN if the block falls. `low` and `high`, shape (3,),
-    are the smallest and largest values of these three gains among the drawn specimens whose block does not fall, NaN
-    with fewer than two. `falls` is the fraction of drawn specimens whose block falls, NaN without any.
+    are the smallest and largest values of these three gains among the `counted` drawn specimens, NaN with fewer than
+    two: all but those whose block falls within the number of cycles that describe a motion; of one that falls later,
+    the cycles before count. `falls` is the fraction of drawn specimens whose block falls, NaN without any.
     """
 
     omega: float
@@ -60,6 +61,7 @@ class LongTerm:
     repeats: int
     low: NDArray[np.float64]
     high: NDArray[np.float64]
+    counted: int = 0
     fallen: int | None = None
     falls: float = nan
 
@@ -93,10 +95,10 @@ def long_term(
     drawn = known.draws(fixed.specimen, members, np.random.default_rng(SEED))
     shorter = min(cycles, MEMBER_CYCLES)
     (bare, motion), *others = in_threads(motions, [(fixed.specimen, cycles), *((each, shorter) for each in drawn)])
-    kept = np.array([np.array(other.within) / each for each, other in others if other.fallen is None])
+    kept = np.array([np.array(other.within) / each for each, other in others if isfinite(other.within[0])])
     low, high = (kept.min(axis=0), kept.max(axis=0)) if len(kept) > 1 else np.full((2, 3), nan)
-    falls = 1.0 - len(kept) / len(others) if others else nan
-    least, mean, most = (each / bare for each in motion.within)
+    falls = sum(other.fallen is not None for _, other in others) / len(others) if others else nan
+    least, mean, most = (each / bare if motion.fallen is None else nan for each in motion.within)
     return LongTerm(
         fixed.omega,
         beta,
@@ -109,6 +111,7 @@ def long_term(
         repeats=motion.repeats,
         low=low,
         high=high,
+        counted=len(kept),
         fallen=motion.fallen,
         falls=falls,
     )
@@ -157,7 +160,7 @@ def attractors_table(found: Sequence[LongTerm]) -> Table:
             f"{name}_{end}": numbers(
                 [values[k] for values in ends],
                 "1",
-                f"{side} value of alpha_2_{name} among the drawn specimens whose block does not fall",
+                f"{side} value of alpha_2_{name} among the drawn specimens, until the block falls",
             )
             for k, name in enumerate(("least", "mean", "greatest"))
             for end, side, ends in (

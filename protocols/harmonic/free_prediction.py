@@ -16,8 +16,8 @@ MEMBERS = attractors.MEMBERS
 """Number of specimens drawn, within the uncertainty, for the ranges of the peaks."""
 
 FEWEST = 20
-"""Smallest number of drawn specimens whose block does not fall with which peaks are compared with the ranges: a further
-one lies within a range of 20 with 90 %, of fewer with less.
+"""Smallest number of drawn specimens that give ranges with which peaks are compared: a further one lies within a range
+of 20 with 90 %, of fewer with less.
 """
 
 PEAKS = ("least", "mean", "greatest")
@@ -38,7 +38,7 @@ def with_free_prediction(
     if found is None:
         return point
     fields: dict[str, Any] = {"repeats_predicted": found["repeats"] or None, "falls_predicted": found["falls"]}
-    outside, compared = list[str](), _survivors(found) >= FEWEST
+    outside, compared = list[str](), found["counted"] >= FEWEST
     for name, low, high in zip(PEAKS, found["low"], found["high"], strict=True):
         fields[f"alpha_2_{name}_predicted"] = found[name]
         fields[f"alpha_2_{name}_low"], fields[f"alpha_2_{name}_high"] = low, high
@@ -87,13 +87,9 @@ def _numbers(motion: LongTerm) -> dict[str, Any]:
         "repeats": motion.repeats,
         "low": [known(value) for value in motion.low.tolist()],
         "high": [known(value) for value in motion.high.tolist()],
+        "counted": motion.counted,
         "falls": known(motion.falls),
     }
-
-
-def _survivors(found: dict[str, Any]) -> int:
-    """Number of drawn specimens whose block does not fall, which give the ranges; 0 if none was drawn."""
-    return 0 if found["falls"] is None else round((1.0 - found["falls"]) * MEMBERS)
 
 
 def _remark(found: dict[str, Any], outside: list[str]) -> str:
@@ -105,9 +101,9 @@ def _remark(found: dict[str, Any], outside: list[str]) -> str:
     text = f"the model's free motion {repeats}, with peaks up to alpha_2 = {found['greatest']:.3f}"
     low, high = found["low"][-1], found["high"][-1]
     if low is not None:
-        number = _survivors(found)
+        number = found["counted"]
         among = f"{MEMBERS} specimens within the uncertainty"
         if number < MEMBERS:
-            among = f"the {number} of {among} whose block does not fall"
+            among = f"the {number} of {among} whose block does not fall soon"
         text += f" ({low:.3f} to {high:.3f} among {among}{', too few for a comparison' * (number < FEWEST)})"
     return text + apart

@@ -84,8 +84,9 @@ def _end_of_range(side: str, name: str) -> Any:
     return quantity(
         None,
         "1",
-        f"{side} end of the range of alpha_2_{name}_predicted among the drawn specimens whose block does not fall; a "
-        "range of n of them contains that of a further one with the probability (n - 1) / (n + 1), 95 % for all 39",
+        f"{side} end of the range of alpha_2_{name}_predicted among the drawn specimens whose block does not fall "
+        "within 240 cycles; a range of n of them contains that of a further one with the probability "
+        "(n - 1) / (n + 1), 95 % for all 39",
     )
 
 

@@ -58,6 +58,17 @@ def test_a_fall_ends_the_motion() -> None:
     assert found.fallen < 300
     assert found.peaks.shape == (0, 2)
     assert found.repeats == 0
+    assert np.isnan(found.within).all()
+
+
+def test_a_motion_that_falls_late_is_described_by_the_cycles_before(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sim.attractor.KEPT", 12)
+    fixed, orbit = orbits(0.97, 15.0, Shaker())
+    driven = replace(orbit, drive=2.0 * orbit.drive)
+    found = attractor(fixed.specimen, Shaker(), driven, cycles=300)
+    assert found.fallen is not None
+    assert found.fallen > 12
+    assert found.within == attractor(fixed.specimen, Shaker(), driven, cycles=found.fallen).within
 
 
 @pytest.mark.parametrize(("n", "length"), [(1, 1), (7, 7), (20, 7), (21, 7), (100, 1), (838, 419)])
