@@ -1,11 +1,11 @@
 """Peaks of free motions of drawn benches, against the simulator's own samples.
 
-    python -m tests.benchmarks.free_peaks [--seeds 100] [--points 15:0.97 12.5:0.64] [--share 0.04] [--scales]
+    python -m tests.benchmarks.free_peaks [--seeds 100] [--points 15:0.97 12.5:0.64] [--scales] [--waves 0.5 2]
 
 Each run is `rockbench run harmonic --no-hold` at one point on the simulated bench, with the specimen drawn as in
-`tests.benchmarks.hold`, and with `--scales` the scales of the sensors as well. The true gains are those of the largest
-true drift within a period that slides over the cycles that the bench evaluated: least, mean and greatest, over the mean
-of the bare frame in its measured cycles.
+`tests.benchmarks.hold`, and with `--scales` the scales of the sensors as well; `--waves 3 6` draws the number of waves
+of the lasers' linearity errors. The true gains are those of the largest true drift within a period that slides over the
+cycles that the bench evaluated: least, mean and greatest, over the peak of the mean true cycle of the bare frame.
 Printed for each run: error in per cent and in expanded uncertainties. In the end, for each quantity: rms of e, the
 share of the intervals that contain the truth, and the share of the predicted ranges that contain it.
 """
@@ -45,12 +45,24 @@ class Witness:
     peaks: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
 
     def of(self, cycles: Sequence[Cycle]) -> NDArray[np.float64]:
-        """Largest true drift in each position of a period within consecutive cycles [m]."""
+        """True drift in consecutive cycles [m]."""
         assert self.analyser is not None
         whole = np.concatenate(self.parts)
         first, last = (self.analyser.start_of(index) for index in (cycles[0].index, cycles[-1].index + 1))
-        drift = np.abs(whole[first - DELAY : last - DELAY])
+        return whole[first - DELAY : last - DELAY]
+
+    def largest(self, cycles: Sequence[Cycle]) -> NDArray[np.float64]:
+        """Largest true drift in each position of a period within consecutive cycles [m]."""
+        drift = np.abs(self.of(cycles))
         return sliding_window_view(drift, round(drift.size / len(cycles))).max(axis=1)
+
+    def peak(self, cycles: Sequence[Cycle]) -> float:
+        """Peak of the mean true cycle, relative to its mean [m]."""
+        drift = self.of(cycles)
+        harmonics = np.fft.rfft(drift)[:: len(cycles)] / drift.size
+        harmonics[0] = 0.0
+        length = 2 * (harmonics.size - 1)
+        return length * float(np.abs(np.fft.irfft(harmonics, length)).max())
 
 
 @contextlib.contextmanager
@@ -81,10 +93,10 @@ def witnessed() -> Generator[Witness]:
         return called
 
     def note_bare(cycles: Sequence[Cycle]) -> None:
-        witness.bare = witness.bare or float(witness.of(cycles).mean())
+        witness.bare = witness.bare or witness.peak(cycles)
 
     def note_free(cycles: Sequence[Cycle]) -> None:
-        witness.peaks = witness.of(cycles[-free_motion.CYCLES :])
+        witness.peaks = witness.largest(cycles[-free_motion.CYCLES :])
 
     with (
         patch.object(SimulatedRig, "begin", begun),
@@ -97,11 +109,18 @@ def witnessed() -> Generator[Witness]:
 
 
 def free_peaks(
-    omega: float, beta: float, seed: int, share: float, options: list[str], *, scales: bool
+    omega: float,
+    beta: float,
+    seed: int,
+    share: float,
+    options: list[str],
+    *,
+    scales: bool,
+    waves: tuple[float, float] | None = None,
 ) -> tuple[dict[str, Any], Any]:
     """The point of one run, and the estimates by name; none if the motion became steady or the block fell."""
     with witnessed() as witness:
-        point = measured(omega, beta, seed, share, ["--no-hold", *options], scales=scales)
+        point = measured(omega, beta, seed, share, ["--no-hold", *options], scales=scales, waves=waves)
     if point["status"] != "modulated":
         return point, {}
     true = witness.peaks / witness.bare
@@ -119,6 +138,7 @@ def study() -> None:
     parser.add_argument("--share", type=float, default=0.04)
     parser.add_argument("--points", nargs="+", default=["15:0.97", "12.5:0.64"])
     parser.add_argument("--scales", action="store_true", help="draw the scales of the sensors as well")
+    parser.add_argument("--waves", type=float, nargs=2, help="fewest and most waves of the linearity errors")
     parser.add_argument("--options", nargs=argparse.REMAINDER, default=[])
     asked = parser.parse_args()
     for text in asked.points:
@@ -126,7 +146,9 @@ def study() -> None:
         found: dict[str, list[Estimate]] = {name: [] for name in NAMES}
         inside: dict[str, list[bool]] = {name: [] for name in NAMES}
         for seed in range(asked.first, asked.first + asked.seeds):
-            point, estimates = free_peaks(omega, beta, seed, asked.share, asked.options, scales=asked.scales)
+            point, estimates = free_peaks(
+                omega, beta, seed, asked.share, asked.options, scales=asked.scales, waves=asked.waves
+            )
             row = f"{omega:g} {beta:g} seed {seed}: {point['status']}, {point.get('cycles_measured')} cycles"
             for name, each in estimates.items():
                 found[name].append(each)

@@ -55,28 +55,41 @@ def configured(specimen: Specimen, factor: float, seed: int, folder: Path) -> Pa
     return path
 
 
-def draw_scales(config: Path, seed: int) -> None:
-    """Add errors of scale to the sensors in a configuration file: both sensors of the table are off by the same, since
-    the displacement is calibrated against the acceleration.
+def draw_sensors(config: Path, seed: int, scales: bool, waves: tuple[float, float] | None) -> None:
+    """Add errors of the sensors to a configuration file: of all `scales`, and the number of waves of the lasers'
+    linearity errors. Both sensors of the table are off by the same, since the displacement is calibrated against the
+    acceleration.
     """
     random = np.random.default_rng([seed, 23])
     table = ACCURACY.table_scale * float(random.standard_normal())
-    lasers = ACCURACY.laser_mismatch / np.sqrt(2.0) * random.standard_normal(2)
+    lasers = (ACCURACY.laser_mismatch / np.sqrt(2.0) * random.standard_normal(2)).tolist()
     errors = {"accelerometer": table, "displacement_sensor": table, "laser_1": lasers[0], "laser_2": lasers[1]}
     with config.open("a", encoding="utf-8") as file:
         for name, error in errors.items():
-            file.write(f"[simulation.bench.{name}]\nscale_error = {float(error)!r}\n")
+            file.write(f"[simulation.bench.{name}]\n")
+            if scales:
+                file.write(f"scale_error = {error!r}\n")
+            if waves is not None and name.startswith("laser"):
+                file.write(f"linearity_periods = {float(random.uniform(*waves))!r}\n")
 
 
 def measured(
-    omega: float, beta: float, seed: int, share: float, options: list[str], *, scales: bool = False
+    omega: float,
+    beta: float,
+    seed: int,
+    share: float,
+    options: list[str],
+    *,
+    scales: bool = False,
+    waves: tuple[float, float] | None = None,
 ) -> dict[str, Any]:
-    """The point of one run, with `truth`, the gain of the true specimen's orbit."""
+    """The point of one run, with `truth`, the gain of the true specimen's orbit; for `scales` and `waves` see
+    `draw_sensors`.
+    """
     specimen, factor = drawn(share, seed)
     with tempfile.TemporaryDirectory() as folder:
         config = configured(specimen, factor, seed, Path(folder))
-        if scales:
-            draw_scales(config, seed)
+        draw_sensors(config, seed, scales, waves)
         command = ["run", "harmonic", "--yes", "--json", "--config", str(config), "--out", f"{folder}/run"]
         command += ["--omega", str(omega), "--beta", str(beta), *options]
         with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()) as told:
