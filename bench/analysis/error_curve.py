@@ -145,38 +145,50 @@ def posterior(checks: tuple[Harmonics, ...], limit: float, whole: float) -> Post
     return Posterior(places, observed, whitening, white, likely / likely.sum(), scale)
 
 
-def likelihoods(factors: NDArray[np.floating[Any]], white: NDArray[np.floating[Any]]) -> Array:
+def likelihoods(
+    factors: NDArray[np.floating[Any]], white: NDArray[np.floating[Any]], caution: float = CAUTION
+) -> Array:
     """Weights of candidates relative to that of the likeliest, shape (...): for the triangular `factors` of the
     covariances of what was measured, shape (..., m, m), and the `white` numbers that these make of it, shape (..., m).
     """
     sizes = np.log(np.diagonal(factors, axis1=-2, axis2=-1)).sum(axis=-1)
     evidence = -0.5 * np.einsum("...m,...m->...", white, white) - sizes
-    return np.asarray(np.exp(CAUTION * (evidence - evidence.max())), dtype=np.float64)
+    return np.asarray(np.exp(caution * (evidence - evidence.max())), dtype=np.float64)
 
 
-def prior(one: Array, left: Array, other: Array, right: Array, limit: float, whole: float, scale: float = 0.0) -> Array:
+def prior(
+    one: Array,
+    left: Array,
+    other: Array,
+    right: Array,
+    limit: float,
+    whole: float,
+    scale: float = 0.0,
+    sines: Array = WAVES,
+) -> Array:
     """Covariances [m2] of linear functions of the error curve of a laser with the measuring range `whole` [m], the
     largest error `limit` [m], and the standard deviation `scale` of the relative error of its scale; see `covariances`.
     """
-    found = 0.5 * limit**2 * covariances(one, left, other, right, whole)
+    found = 0.5 * limit**2 * covariances(one, left, other, right, whole, sines)
     return found if scale == 0.0 else found + scale**2 * np.outer(left @ one, right @ other)
 
 
-def covariances(one: Array, left: Array, other: Array, right: Array, whole: float) -> Array:
-    """Covariances of linear functions of the error curve, relative to its variance, shape (2 NUMBERS, l, r): the first
-    NUMBERS entries are for irregular curves, the others for sines. `left`, shape (l, n), applies to the values at the
-    places `one`, shape (n,), and `right`, shape (r, m), to those at `other`, shape (m,).
+def covariances(one: Array, left: Array, other: Array, right: Array, whole: float, sines: Array = WAVES) -> Array:
+    """Covariances of linear functions of the error curve, relative to its variance, shape (NUMBERS + K, l, r): the
+    first NUMBERS entries are for irregular curves, the others for `sines` with these numbers of waves, shape (K,).
+    `left`, shape (l, n), applies to the values at the places `one`, shape (n,), and `right`, shape (r, m), to those at
+    `other`, shape (m,).
     """
     first = 2.0 * pi * FEWEST / whole
     distances: Array = one[:, None] - other[None, :]
     curve: Array = np.exp(-0.5 * (first * distances) ** 2)
-    found = np.empty((2 * NUMBERS, left.shape[0], right.shape[0]))
+    found = np.empty((NUMBERS + sines.size, left.shape[0], right.shape[0]))
     for k in range(NUMBERS):
         # this order of products is faster, because `right` has fewer rows
         found[k] = left @ (curve @ right.T)
         curve *= curve
     # covariance of a sine of random phase: the cosine of the phase difference
-    angles = 2.0 * pi / whole * WAVES
+    angles = 2.0 * pi / whole * sines
     for part in (np.cos, np.sin):
         near, far = part(np.outer(angles, one)) @ left.T, part(np.outer(angles, other)) @ right.T
         sines = near[:, :, None] * far[:, None, :]

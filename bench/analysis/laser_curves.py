@@ -1,13 +1,9 @@
 """Error curves of both lasers, from the equations that the second storey gives in every test.
 
 The curves are random functions as in `bench.analysis.error_curve`, for each pair of candidates for the two lasers; a
-pair is weighted by a power of its evidence. They are splines through their values at readings `SPACING`
-apart, of which the equations (`bench.analysis.storey_equations`) are linear functions, so that mean and covariance of
-the curves follow from Gaussian process regression (Rasmussen and Williams, 2006, section 2.2).
-
-The variance of an equation is the one with the largest evidence for flexible curves. It is enlarged by the ratio of
-what the residuals of whole blocks contribute to what independent residuals would: errors of the model, which are
-correlated, count as noise.
+pair is weighted by a power of its evidence. They are splines through their values at readings `SPACING` apart, of which
+the equations (`bench.analysis.storey_equations`, `bench.analysis.curve_observations`) are linear functions, so that
+mean and covariance of the curves follow from Gaussian process regression (Rasmussen and Williams, 2006, section 2.2).
 
 Equations relate the two lasers with each other: of errors in proportion to the reading they tell the difference only,
 which is that of the scales. What both have in common changes all drifts alike, and the residuals with them: readings
@@ -20,10 +16,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.analysis.error_curve import likelihoods, prior
+from bench.analysis.curve_observations import Observations, observations, without_noise_in_rows
+from bench.analysis.error_curve import CAUTION, NUMBERS, WAVES, block_diagonal, likelihoods, prior
 from bench.analysis.linearity import Effect, LinearFrame, LinearityErrors
 from bench.analysis.signals import LASER_1, LASER_2
-from bench.analysis.storey_equations import KEPT, StoreyMotion, storey_motion
+from bench.analysis.storey_equations import KEPT, Equations, StoreyMotion, storey_motion
 
 Array = NDArray[np.float64]
 
@@ -36,15 +33,16 @@ FLEXIBLE = 10
 FEWEST = 4
 """Minimum number of blocks of a test."""
 
-ROUNDING = 1e-10
-"""Relative size of a combination below which it is due to rounding."""
+LIKELY = 1e-3
+"""Smallest weight of a pair of candidates relative to the largest that is not neglected."""
 
-USEFUL, LIKELY = 1e-3, 1e-3
-"""Smallest variance of an observation relative to its noise, and smallest weight of a pair relative to the largest,
-that are not neglected."""
+FINER = 2
+"""Sines for each factor of sqrt(2) between their numbers of waves: the equations tell the number of waves of a sine
+more exactly than that of an irregular curve."""
 
-NOISES: Array = np.geomspace(1e-8, 1e-3, 240)
-"""Standard deviations of an equation that are compared [m]."""
+SINES: Array = WAVES[0] * 2.0 ** (0.5 * np.arange(FINER * (NUMBERS - 1) + 1) / FINER)
+POSSIBLE: Array = np.concatenate((np.ones(NUMBERS), np.full(SINES.size, 1.0 / FINER)))
+"""Numbers of waves of the candidates that are sines, and prior weights of all candidates."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,13 +99,15 @@ def laser_curves(
     ranges: tuple[float, float],
     mismatch: float,
     block: float,
+    caution: float = CAUTION,
 ) -> LaserCurves | None:
     """Curves according to the signals of `tests` with the same lasers, shape (n, len(SIGNALS)) each, of a `frame` with
     or without block; None if no test has a strong motion that is long and complete enough, or if the motions tell
     nothing of the errors.
 
     `limits` are the largest linearity errors and `ranges` the measuring ranges of the lasers [m]; `mismatch` is the
-    standard uncertainty of the ratio of their scales. Residuals may be correlated within `block` seconds.
+    standard uncertainty of the ratio of their scales. Residuals may be correlated within `block` seconds. Pairs of
+    candidates are weighted by the power `caution` of their evidence.
     """
     moved = [found for each in tests if (found := storey_motion(each, frame, sample_rate)) is not None]
     if not moved or 0.0 in limits:
@@ -119,24 +119,38 @@ def laser_curves(
     )
     bases = _basis(first), _basis(second)
     found = [each.equations(bases) for each in moved]
-    rows, values = (np.concatenate([each[k] for each in found]) for k in (0, 1))
-    removed = sum(each[2] for each in found)
-    rows[:, -1] *= mismatch
-    # the readings themselves as errors: a row times them is its value
-    alike = np.concatenate((first, second, [0.0]))
-    rows -= np.outer(values, alike / (alike @ alike))
+    rows, slopes = _joined(found)
+    values = np.concatenate([each.values for each in found])
+    sizes = np.ones(rows.shape[1])
+    sizes[first.size + second.size] = mismatch
+    # the readings themselves as errors
+    alike = np.zeros(rows.shape[1])
+    alike[: first.size + second.size] = np.concatenate((first, second))
+    rows, slopes = (sizes * each - np.outer(each @ alike, alike / (alike @ alike)) for each in (rows, slopes))
     priors = [
-        prior(places, np.eye(places.size), places, np.eye(places.size), limit, whole)
+        prior(places, np.eye(places.size), places, np.eye(places.size), limit, whole, sines=SINES)
         for places, limit, whole in zip((first, second), limits, ranges, strict=True)
     ]
-    observed = _observed(rows, values, removed, _blocks(moved, block), priors[0][FLEXIBLE], priors[1][FLEXIBLE])
+    flexible = priors[0][FLEXIBLE], priors[1][FLEXIBLE]
+    observed = observations(rows, values, sum(each.removed for each in found), _blocks(moved, block), flexible)
     if not observed.values.size:
         return None
-    mean, covariance = _posterior(observed, priors[0], priors[1])
-    sizes = np.append(np.ones(mean.size - 1), mismatch)
-    return LaserCurves(
-        (first, second), sizes * mean, np.outer(sizes, sizes) * covariance, float(np.sqrt(np.mean(observed.noise**2)))
-    )
+    noise = float(np.sqrt(np.mean(np.diag(observed.noise))))
+    ends = np.cumsum([each.values.size for each in found]).tolist()
+    observed = without_noise_in_rows(observed, rows, values, slopes, ends)
+    mean, covariance = _posterior(observed, priors[0], priors[1], caution)
+    sizes = sizes[: mean.size]
+    return LaserCurves((first, second), sizes * mean, np.outer(sizes, sizes) * covariance, noise)
+
+
+def _joined(found: Sequence[Equations]) -> tuple[Array, Array]:
+    """Rows of all tests and their slopes, shapes (equations, unknowns) and (tests, unknowns). The unknowns are those of
+    the curves, the scale, and the changes of the second storey in each test.
+    """
+    rows, slopes = np.concatenate([each.rows for each in found]), np.array([each.slopes for each in found])
+    own = block_diagonal([each.own for each in found])
+    own_slopes = block_diagonal([each.own_slopes[None] for each in found])
+    return np.concatenate((rows, own), axis=1), np.concatenate((slopes, own_slopes), axis=1)
 
 
 def _places(readings: Array, spacing: float) -> Array:
@@ -168,71 +182,21 @@ def _blocks(moved: Sequence[StoreyMotion], block: float) -> NDArray[np.intp]:
     return np.concatenate(firsts)
 
 
-@dataclass(frozen=True, eq=False)
-class _Observed:
-    """Independent combinations of the equations: `rows`, shape (k, n + m + 1), and `values`, shape (k,), with the
-    standard deviations `noise`, shape (k,) [m].
+def _posterior(observed: Observations, first: Array, second: Array, caution: float) -> tuple[Array, Array]:
+    """Mean and covariance of the values of both curves and of the scale, for the prior covariances of the candidates
+    for the lasers, shapes (K, n, n) and (K, m, m), which are weighted by the power `caution` of their evidence. The
+    prior standard deviation of the scale and of further unknowns is 1.
     """
-
-    rows: Array
-    values: Array
-    noise: Array
-
-
-def _observed(
-    rows: Array, values: Array, removed: int, blocks: NDArray[np.intp], first: Array, second: Array
-) -> _Observed:
-    """The useful combinations of the equations, from which `removed` columns were projected out. Their noise is
-    estimated for curves with the prior covariances `first` and `second`.
-    """
-    left, sizes, right = np.linalg.svd(rows, full_matrices=False)
-    present = sizes > ROUNDING * sizes[0]
-    left, sizes, right = left[:, present], sizes[present], right[present]
-    combined, seen = sizes[:, None] * right, left.T @ values
-    n = len(first)
-    prior = combined[:, :n] @ first @ combined[:, :n].T + combined[:, n:-1] @ second @ combined[:, n:-1].T
-    variances, turned = np.linalg.eigh(prior + np.outer(combined[:, -1], combined[:, -1]))
-    variances = np.maximum(variances, 0.0)
-    left, combined, seen = left @ turned, turned.T @ combined, turned.T @ seen
-    beside, free = max(float(values @ values - seen @ seen), 0.0), values.size - removed - seen.size
-    spread = variances + NOISES[:, None] ** 2
-    evidence = -0.5 * (np.sum(seen**2 / spread + np.log(spread), axis=1) + beside / NOISES**2) - free * np.log(NOISES)
-    noise = np.full(seen.size, NOISES[evidence.argmax()])
-    # residuals of curves that follow correlated errors less closely show more of them
-    for _ in range(2):
-        noise = np.maximum(noise, _correlated(left, seen, values, blocks, variances, noise))
-    useful = variances > USEFUL * noise**2
-    return _Observed(combined[useful], seen[useful], noise[useful])
-
-
-def _correlated(
-    left: Array, seen: Array, values: Array, blocks: NDArray[np.intp], variances: Array, noise: Array
-) -> Array:
-    """Standard deviation of independent residuals that would contribute as much to each combination, `seen` = left^T
-    values with the prior `variances`, as the residuals of whole blocks do [m]. The variances of few blocks scatter:
-    each is averaged with the mean over all useful combinations.
-    """
-    useful = variances > USEFUL * noise**2
-    residual = values - left @ (seen * variances / (variances + noise**2))
-    squares = np.sum(np.add.reduceat(left * residual[:, None], blocks, axis=0) ** 2, axis=0)
-    # the sum over all blocks vanishes
-    squares *= blocks.size / (blocks.size - 1)
-    mean = float(squares[useful].mean()) if useful.any() else 0.0
-    return np.sqrt(0.5 * (mean + squares))
-
-
-def _posterior(observed: _Observed, first: Array, second: Array) -> tuple[Array, Array]:
-    """Mean and covariance of the values of both curves and of the scale, whose prior standard deviation is 1, for the
-    prior covariances of the candidates for the lasers, shapes (K, n, n) and (K, m, m).
-    """
-    n, rows = first.shape[1], observed.rows
+    n, known = first.shape[1], first.shape[1] + second.shape[1] + 1
+    rows, further = observed.rows[:, :known], observed.rows[:, known - 1 :]
     crossed = [rows[:, :n] @ first, rows[:, n:-1] @ second]
     own = crossed[0] @ rows[:, :n].T
-    others = crossed[1] @ rows[:, n:-1].T + np.outer(rows[:, -1], rows[:, -1])
-    others = others + np.diag(observed.noise**2)
+    others = crossed[1] @ rows[:, n:-1].T + further @ further.T
+    others = others + observed.noise
     factors = np.linalg.cholesky(own[:, None] + others[None])
     white = np.linalg.solve(factors, np.broadcast_to(observed.values[:, None], (*factors.shape[:3], 1)))[..., 0]
-    likely = likelihoods(factors, white)
+    likely = np.outer(POSSIBLE, POSSIBLE) * likelihoods(factors, white, caution)
+    likely /= likely.max()
     likely = np.where(likely >= LIKELY, likely, 0.0)
     likely /= likely.sum()
     one, other = np.nonzero(likely)

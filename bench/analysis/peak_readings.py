@@ -24,6 +24,9 @@ class PeakReadings:
     weights : derivatives of the peak of a fitted cycle with respect to the readings in `zero`, shape (n,); None if the
         peak is the reading at the peak minus the mean of `zero`.
     fitted : the fitted cycles of which it is the peak; None for a fit to the readings around a single peak.
+    several : of a mean of n peaks, the readings of both lasers at each [m], shape (2, n), and the sign of the drift
+        there, shape (n,); `lasers`, `speeds` and `swings` are then means, turned to the positive side. None for a
+        single peak.
     """
 
     drift: float
@@ -35,13 +38,22 @@ class PeakReadings:
     at_rest: bool
     weights: Array | None = None
     fitted: FittedPeak | None = None
+    several: tuple[Array, Array] | None = None
+
+    @property
+    def sides(self) -> float:
+        """Derivative of the size of the peak with respect to the drift: 1, or less if the peaks are on both sides."""
+        return 1.0 if self.several is None else float(self.several[1].mean())
 
     def effect(self, laser: int) -> Effect:
         """Effect of the error of laser 0 or 1 on the peak."""
         zero = self.zero[laser]
         if self.weights is not None:
             return Effect(zero, self.weights)
-        means = np.full(zero.size, -1.0 / zero.size)
+        means = np.full(zero.size, -self.sides / zero.size)
+        if self.several is not None:
+            readings, sides = self.several
+            return Effect(np.append(zero, readings[laser]), np.append(means, sides / sides.size))
         return Effect(np.append(zero, self.lasers[laser]), np.append(means, 1.0))
 
 

@@ -9,6 +9,7 @@ For a calibrated laser, the uncertainty of the calibration applies to the covere
 readings have the uncertainty of the continued curve, and others that of the data sheet.
 """
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import hypot, sqrt
@@ -17,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.analysis.draws import Draws
-from bench.analysis.error_curve import Checks, Harmonics, widest
+from bench.analysis.error_curve import CAUTION, Checks, Harmonics, widest
 from bench.analysis.laser_calibration import LaserCalibration
 from bench.analysis.laser_curves import LaserCurves, laser_curves
 from bench.analysis.linearity import SMOOTH, Effect, LinearFrame, LinearityErrors, linearity_errors
@@ -101,17 +102,17 @@ class SensorUncertainty:
         return replace(self, checks=() if checks is None else (checks,), corrected=True)
 
     def found_in(
-        self, tests: Sequence[Array], frame: LinearFrame, sample_rate: float, block: float
+        self, tests: Sequence[Array], frame: LinearFrame, sample_rate: float, block: float, caution: float = CAUTION
     ) -> "SensorUncertainty":
         """A copy for readings corrected for the errors that the signals of `tests` reveal, with residuals that may be
         correlated for `block` seconds (`bench.analysis.laser_curves`); the same object if `block` is zero, or if the
         tests reveal none. What is left of the errors of calibrated lasers, also beyond the calibrated readings, is
-        found in the same way.
+        found in the same way. Possible shapes are weighted by the power `caution` of their evidence.
         """
         if not block:
             return self
         first, second = (self.accuracy.laser_linearity * whole for whole in self.ranges)
-        curves = laser_curves(tests, frame, sample_rate, (first, second), self.ranges, self.mismatch, block)
+        curves = laser_curves(tests, frame, sample_rate, (first, second), self.ranges, self.mismatch, block, caution)
         return self if curves is None else replace(self, checks=(), corrected=True, curves=curves)
 
     def checks_of(self, laser: int) -> list[Harmonics]:
@@ -255,7 +256,8 @@ class SensorUncertainty:
 
     def steps(self, seen: PeakReadings, laser: int, draws: Draws) -> Array:
         """Errors [m] due to a laser's resolution, shape (n,): the rounding errors of the fit, and one rounding error if
-        the zero was taken at rest. A fit around a single peak averages those of the steps that the laser passes.
+        the zero was taken at rest. A fit around a single peak averages those of the steps that the laser passes; of a
+        mean of several peaks, those within one step are rounded alike.
         """
         step = self.accuracy.laser_resolution
         if step == 0.0:
@@ -264,5 +266,9 @@ class SensorUncertainty:
             variance = seen.fitted.variances(step)[laser]
         else:
             variance = step**2 / (12.0 * (1.0 + 2.0 * seen.swings[laser] / step))
-        zero = step * draws.uniform(-0.5, 0.5) if seen.at_rest else 0.0
+        if seen.several is not None:
+            steps: Array = np.rint(seen.several[0][laser] / step)
+            alike = Counter[float](steps.tolist())
+            variance *= sum(number**2 for number in alike.values()) / alike.total() ** 2
+        zero = seen.sides * step * draws.uniform(-0.5, 0.5) if seen.at_rest else 0.0
         return sqrt(variance) * draws.normal() + zero

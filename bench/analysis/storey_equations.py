@@ -14,11 +14,16 @@ the acceleration of the table is added.
 
 White noise of the readings, equal in both, has the spectrum |1 + i q omega - p omega^2|^2 + |1 + i q omega|^2 in the
 equations, least near the modes. They are divided by its root, neglecting q, so that their noise is white as well, and
-limited to the band of the motion. What else may be in a residual has columns of its own, which are projected out:
-changes of p and q, the square and the cube of the drift (stiffness that is not constant), the sign of its rate
-(friction), an offset, the table's acceleration, and the delay between the lasers, which wanders with their free-running
-clocks. With the stiffness 1 + b d + c d^2, errors of the drift count with its slope 1 + 2 b d + 3 c d^2, and so does
-noise: an equation has the weight 1 / (1 + |2 b d + 3 c d^2|).
+limited to the band of the motion. What else may be in a residual has columns of its own: changes of p and the square
+and the cube of the drift (stiffness that is not constant) are further unknowns; changes of q, the sign of the rate of
+the drift (friction), an offset, the table's acceleration, and the delay between the lasers, which wanders with their
+free-running clocks, are projected out. With the stiffness 1 + b d + c d^2, errors of the drift count with its slope
+1 + 2 b d + 3 c d^2, and so does noise: an equation has the weight 1 / (1 + |2 b d + 3 c d^2|).
+
+The coefficients of an equation are functions of the same readings, so that their noise is correlated with that of its
+right-hand side: on average, a coefficient contains the mean slope of its curve times this noise. The same applies to
+the acceleration of the second storey and to powers of the drift, but not to its rate, whose noise is a quarter of a
+period ahead.
 """
 
 from collections.abc import Callable, Sequence
@@ -34,6 +39,7 @@ from bench.analysis.linearity import LinearFrame
 from bench.analysis.signals import ACCELERATION, LASER_1, LASER_2, bridged
 
 Array = NDArray[np.float64]
+Bases = tuple[Callable[[Array], Array], Callable[[Array], Array]]
 
 BAND = 20.0
 """Upper frequency of the equations [Hz]."""
@@ -52,6 +58,28 @@ LONGEST, AROUND = 0.02, 17.0
 KNOTS = 1.0
 """Time between the values of the wandering delay, between which it is linear [s]."""
 
+STEP = 1e-6
+"""Step of the finite differences for the slope of a curve [m]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Equations:
+    """Equations of one test, after the projection of `removed` columns.
+
+    The `values`, shape (number,) [m], are the sum of `rows`, shape (number, n + m + 1), times the coefficients of the
+    error curves of laser 1 and laser 2, relative to the error at rest, and the scale of laser 2 relative to that of
+    laser 1, and of `own`, shape (number, 3), times relative changes of -p and of minus the stiffness at the largest
+    drift, linear and square in it. `slopes` and `own_slopes`, shapes (n + m + 1,) and (3,), are the regression
+    coefficients of the columns on the noise of the values.
+    """
+
+    rows: Array
+    own: Array
+    values: Array
+    removed: int
+    slopes: Array
+    own_slopes: Array
+
 
 @dataclass(frozen=True, eq=False)
 class StoreyMotion:
@@ -66,12 +94,9 @@ class StoreyMotion:
     kept: NDArray[np.intp]
     nominal: float
 
-    def equations(self, bases: tuple[Callable[[Array], Array], Callable[[Array], Array]]) -> tuple[Array, Array, int]:
-        """Rows and right-hand sides [m] of the equations, after the projection, shapes (number, n + m + 1) and
-        (number,), and the number of columns that were projected out. The unknowns are the coefficients of both error
-        curves, relative to the error at rest, and the scale of laser 2 relative to that of laser 1.
-
-        `bases` compute the basis functions of the curves at readings of shape (k,): shapes (n, k) and (m, k).
+    def equations(self, bases: Bases) -> Equations:
+        """Equations for the coefficients of the functions `bases` of the two error curves, which are computed for
+        readings of shape (k,): shapes (n, k) and (m, k).
         """
         own = self._own()
         steady: Array = own[0]
@@ -92,8 +117,41 @@ class StoreyMotion:
         values = steady + q * own[1] + p * own[2]
         weight = 1.0 / (1.0 + np.abs(stiffer[self.kept]))
         rows, values = weight[:, None] * rows, weight * values
-        across = np.linalg.qr((weight * np.concatenate((own[1:], self._delays(upper)))).T).Q
-        return rows - across @ (across.T @ rows), values - across @ (across.T @ values), across.shape[1]
+        largest = np.abs(drift[self.kept]).max()
+        scales = np.array([p, 1.0 / largest, 1.0 / largest**2])
+        changes = scales * (weight * own[2:5]).T
+        across = np.linalg.qr((weight * np.concatenate((own[1:2], own[5:], self._delays(upper)))).T).Q
+        rows, changes, values = (each - across @ (across.T @ each) for each in (rows, changes, values))
+        return Equations(rows, changes, values, across.shape[1], self._slopes(bases), scales * self._own_slopes(drift))
+
+    def _slopes(self, bases: Bases) -> Array:
+        """Mean slopes of the basis functions, each times the share of its laser in the noise of an equation; the scale
+        of laser 2 has the slope 1.
+        """
+        second = self._with_noise((1.0 - self._y) ** 2)
+        # a quarter of the readings has the same mean
+        read = self.readings[:, self.kept[::4]]
+        slopes = [
+            share * (base(each + STEP) - base(each - STEP)).mean(axis=1) / (2.0 * STEP)
+            for share, base, each in zip((1.0 - second, second), bases, read, strict=True)
+        ]
+        return np.concatenate((*slopes, [second]))
+
+    def _own_slopes(self, drift: Array) -> Array:
+        """The same of the second storey's acceleration and of the square and the cube of the `drift`."""
+        bending, differing = self._with_noise(-(self._s.imag**2) * (1.0 - self._y)), self._with_noise(2.0 - self._y)
+        mean, square = float(drift[self.kept].mean()), float(np.mean(drift[self.kept] ** 2))
+        return np.array([bending, 2.0 * mean * differing, 3.0 * square * differing])
+
+    def _with_noise(self, product: Array) -> float:
+        """Mean, over the band, of the `product` of a response with that of the equations, relative to their noise."""
+        noise = (1.0 - self._y) ** 2 + 1.0
+        band = noise * self._window**2
+        return float(band @ (product / noise) / band.sum())
+
+    @cached_property
+    def _y(self) -> Array:
+        return self.nominal * self._s.imag**2
 
     def _own(self) -> Array:
         """Filtered drift, its rate, acceleration of the second storey, square and cube of the drift, and what else may
@@ -135,8 +193,7 @@ class StoreyMotion:
     @cached_property
     def _window(self) -> Array:
         """Response that limits the band and makes the noise of the readings white."""
-        square = self._s.imag**2
-        noise = np.sqrt((1.0 - self.nominal * square) ** 2 + 1.0)
+        noise = np.sqrt((1.0 - self._y) ** 2 + 1.0)
         return np.asarray(1.0 / (1.0 + (self._s.imag / (2.0 * pi * BAND)) ** 8) / noise)
 
     def _filtered(self, values: Array, response: NDArray[np.complex128] | Array) -> Array:

@@ -26,6 +26,12 @@ from bench.analysis.unsteady_peaks import UnsteadyPeaks, uninterrupted, unsteady
 
 Array = NDArray[np.float64]
 
+CAUTION = 1.0
+"""Power of the evidence by which the shapes of error curves are weighted. The residuals of a long motion near one
+frequency are mostly noise and rounding. Under records, they are due to the clocks of the lasers, and evidence
+is worth less.
+"""
+
 
 @dataclass(frozen=True, eq=False)
 class Revealed:
@@ -54,7 +60,7 @@ def revealed(
         return None
     tests = [_signals(each) for each in (peaks.used, reference.used)]
     sample_rate = len(tests[0]) / len(peaks.used) * omega / tau
-    found = sensors.found_in(tests, frame, sample_rate, block)
+    found = sensors.found_in(tests, frame, sample_rate, block, CAUTION)
     if found.curves is None:
         return None
     signals = ReadingCorrection(found)(tests[0])

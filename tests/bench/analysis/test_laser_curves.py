@@ -157,10 +157,10 @@ def test_exact_readings_leave_nothing_in_the_equations(frame: LinearFrame, groun
     for moved in (two_motions()[0], *motions({3: 0.03}, softer=0.93)):
         seen = storey_motion(signals(moved, (none, none), grounded=grounded), frame, RATE)
         assert seen is not None
-        rows, values, removed = seen.equations((np.atleast_2d, np.atleast_2d))
-        assert rows.shape == (seen.kept.size, 3)
-        assert 10 < removed < seen.kept.size // 10
-        assert np.sqrt(np.mean(values**2)) < 1e-6
+        found = seen.equations((np.atleast_2d, np.atleast_2d))
+        assert found.rows.shape == (seen.kept.size, 3)
+        assert 10 < found.removed < seen.kept.size // 10
+        assert np.sqrt(np.mean(found.values**2)) < 1e-6
 
 
 @pytest.mark.parametrize("draws", [4, pytest.param(16, marks=pytest.mark.soak)])
