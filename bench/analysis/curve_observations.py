@@ -5,12 +5,11 @@ given prior. The variance of an equation is the one with the largest evidence fo
 ratio of what the residuals of whole blocks contribute to what independent residuals would: errors of the model, which
 are correlated, count as noise.
 
-Noise of the readings is also in the coefficients. In the equations of one test, n with the noise sigma and with the
-regression coefficients g of the rows on it, it adds n sigma^2 g to rows^T values and n sigma^2 g g^T to rows^T rows on
-average, and a motion that is nearly a single sine would seem to have errors in proportion to its readings. Both are
-subtracted (moment estimator of errors in variables: Fuller, 1987, Measurement Error Models, section 2.2). The sum of
-squares scatters, which adds its variance times g g^T to the covariance of rows^T values: 2 n sigma^4 for independent
-residuals, in general the sum of the squares of their periodogram.
+Noise of the readings is also in the coefficients, so that a motion that is nearly a single sine would seem to have
+errors in proportion to its readings. In the n equations of one test, whose values have the noise sigma, rows with the
+regression coefficients g on this noise add n sigma^2 g to rows^T values and n sigma^2 g g^T to rows^T rows on average.
+Both are subtracted (moment estimator of errors in variables: Fuller, 1987, Measurement Error Models, section 2.2). The
+noise in the rows that is independent of that of the values is neglected: it is small beside the rows.
 """
 
 from collections.abc import Sequence
@@ -34,15 +33,15 @@ NOISES: Array = np.geomspace(1e-8, 1e-3, 240)
 
 @dataclass(frozen=True, eq=False)
 class Observations:
-    """Observed `values`, shape (k,), of linear functions of the unknowns, `rows`, shape (k, unknowns), with the
-    covariance `noise`, shape (k, k). `made`, shape (unknowns, k), makes them of rows^T values of the equations.
-    `expected`, shape (unknowns,), are the unknowns that they give with the prior of flexible curves.
+    """Observed `values`, shape (k,), of linear functions of the unknowns, `rows`, shape (k, unknowns), with independent
+    `noise`, shape (k,), given as standard deviation. `transform`, shape (unknowns, k): values = transform^T rows^T
+    values of the equations. `expected`, shape (unknowns,), is the posterior mean of the unknowns for flexible curves.
     """
 
     rows: Array
     values: Array
     noise: Array
-    made: Array
+    transform: Array
     expected: Array
 
 
@@ -75,8 +74,8 @@ def observations(
     return Observations(
         rows=combined,
         values=seen,
-        noise=np.diag(noise**2),
-        made=(right.T / sizes) @ turned[:, useful],
+        noise=noise,
+        transform=(right.T / sizes) @ turned[:, useful],
         expected=prior @ combined.T @ (seen / (variances[useful] + noise**2)),
     )
 
@@ -100,18 +99,17 @@ def _correlated(
 def without_noise_in_rows(
     observed: Observations, rows: Array, values: Array, slopes: Array, ends: Sequence[int]
 ) -> Observations:
-    """What is `observed` with the equations `rows` and `values` of several tests, without what the noise in the rows
-    contributes on average. `ends` are the indices after the last equation of each test; `slopes`, shape (tests,
-    unknowns), are the regression coefficients of its rows on the noise.
+    """`observed` without the expected contribution of the noise in the rows.
+
+    `rows`, shape (number, unknowns), and `values`, shape (number,) [m], are the equations of all tests, and `ends` the
+    indices after the last equation of each; `slopes`, shape (tests, unknowns), are the regression coefficients of its
+    rows on the noise.
     """
     residual = values - rows @ observed.expected
-    parts = [residual[begin:end] for begin, end in pairwise((0, *ends))]
-    squares = np.array([each @ each for each in parts])
-    scatter = np.array([np.sum((np.abs(np.fft.fft(each)) ** 2 / each.size) ** 2) for each in parts])
-    across = slopes @ observed.made
+    squares = np.array([residual[begin:end] @ residual[begin:end] for begin, end in pairwise((0, *ends))])
+    across = slopes @ observed.transform
     return replace(
         observed,
         rows=observed.rows - (across.T * squares) @ slopes,
         values=observed.values - squares @ across,
-        noise=observed.noise + (across.T * scatter) @ across,
     )

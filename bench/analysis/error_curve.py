@@ -191,8 +191,8 @@ def covariances(one: Array, left: Array, other: Array, right: Array, whole: floa
     angles = 2.0 * pi / whole * sines
     for part in (np.cos, np.sin):
         near, far = part(np.outer(angles, one)) @ left.T, part(np.outer(angles, other)) @ right.T
-        sines = near[:, :, None] * far[:, None, :]
-        found[NUMBERS:] = sines if part is np.cos else found[NUMBERS:] + sines
+        products = near[:, :, None] * far[:, None, :]
+        found[NUMBERS:] = products if part is np.cos else found[NUMBERS:] + products
     return found
 
 

@@ -37,8 +37,10 @@ LIKELY = 1e-3
 """Smallest weight of a pair of candidates relative to the largest that is not neglected."""
 
 FINER = 2
-"""Sines for each factor of sqrt(2) between their numbers of waves: the equations tell the number of waves of a sine
-more exactly than that of an irregular curve."""
+"""Number of sines for each factor of sqrt(2) between numbers of waves. The equations distinguish numbers of waves of a
+sine that differ by less: with one, 87 instead of 96 % of the intervals of drawn lasers with 3 to 6 waves contain the
+gain of a free motion (15 rad/s, beta 0.97).
+"""
 
 SINES: Array = WAVES[0] * 2.0 ** (0.5 * np.arange(FINER * (NUMBERS - 1) + 1) / FINER)
 POSSIBLE: Array = np.concatenate((np.ones(NUMBERS), np.full(SINES.size, 1.0 / FINER)))
@@ -121,12 +123,12 @@ def laser_curves(
     found = [each.equations(bases) for each in moved]
     rows, slopes = _joined(found)
     values = np.concatenate([each.values for each in found])
-    sizes = np.ones(rows.shape[1])
-    sizes[first.size + second.size] = mismatch
+    scales = np.ones(rows.shape[1])
+    scales[first.size + second.size] = mismatch
     # the readings themselves as errors
     alike = np.zeros(rows.shape[1])
     alike[: first.size + second.size] = np.concatenate((first, second))
-    rows, slopes = (sizes * each - np.outer(each @ alike, alike / (alike @ alike)) for each in (rows, slopes))
+    rows, slopes = (scales * each - np.outer(each @ alike, alike / (alike @ alike)) for each in (rows, slopes))
     priors = [
         prior(places, np.eye(places.size), places, np.eye(places.size), limit, whole, sines=SINES)
         for places, limit, whole in zip((first, second), limits, ranges, strict=True)
@@ -135,12 +137,12 @@ def laser_curves(
     observed = observations(rows, values, sum(each.removed for each in found), _blocks(moved, block), flexible)
     if not observed.values.size:
         return None
-    noise = float(np.sqrt(np.mean(np.diag(observed.noise))))
     ends = np.cumsum([each.values.size for each in found]).tolist()
     observed = without_noise_in_rows(observed, rows, values, slopes, ends)
     mean, covariance = _posterior(observed, priors[0], priors[1], caution)
-    sizes = sizes[: mean.size]
-    return LaserCurves((first, second), sizes * mean, np.outer(sizes, sizes) * covariance, noise)
+    noise = float(np.sqrt(np.mean(observed.noise**2)))
+    scales = scales[: mean.size]
+    return LaserCurves((first, second), scales * mean, np.outer(scales, scales) * covariance, noise)
 
 
 def _joined(found: Sequence[Equations]) -> tuple[Array, Array]:
@@ -192,7 +194,7 @@ def _posterior(observed: Observations, first: Array, second: Array, caution: flo
     crossed = [rows[:, :n] @ first, rows[:, n:-1] @ second]
     own = crossed[0] @ rows[:, :n].T
     others = crossed[1] @ rows[:, n:-1].T + further @ further.T
-    others = others + observed.noise
+    others = others + np.diag(observed.noise**2)
     factors = np.linalg.cholesky(own[:, None] + others[None])
     white = np.linalg.solve(factors, np.broadcast_to(observed.values[:, None], (*factors.shape[:3], 1)))[..., 0]
     likely = np.outer(POSSIBLE, POSSIBLE) * likelihoods(factors, white, caution)

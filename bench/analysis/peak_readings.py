@@ -24,9 +24,9 @@ class PeakReadings:
     weights : derivatives of the peak of a fitted cycle with respect to the readings in `zero`, shape (n,); None if the
         peak is the reading at the peak minus the mean of `zero`.
     fitted : the fitted cycles of which it is the peak; None for a fit to the readings around a single peak.
-    several : of a mean of n peaks, the readings of both lasers at each [m], shape (2, n), and the sign of the drift
-        there, shape (n,); `lasers`, `speeds` and `swings` are then means, turned to the positive side. None for a
-        single peak.
+    several : of a mean of n peaks, the readings of both lasers at each [m], shape (2, n), and the derivatives of the
+        mean with respect to the drift there, shape (n,): shares of the peaks, negative where the drift is. `lasers`,
+        `speeds` and `swings` are then means, turned to the positive side. None for a single peak.
     """
 
     drift: float
@@ -42,8 +42,10 @@ class PeakReadings:
 
     @property
     def sides(self) -> float:
-        """Derivative of the size of the peak with respect to the drift: 1, or less if the peaks are on both sides."""
-        return 1.0 if self.several is None else float(self.several[1].mean())
+        """Derivative of the peak, turned to the positive side, with respect to the zero of the drift, negative: 1, or
+        between -1 and 1 for a mean of peaks on both sides.
+        """
+        return 1.0 if self.several is None else float(self.several[1].sum())
 
     def effect(self, laser: int) -> Effect:
         """Effect of the error of laser 0 or 1 on the peak."""
@@ -52,8 +54,8 @@ class PeakReadings:
             return Effect(zero, self.weights)
         means = np.full(zero.size, -self.sides / zero.size)
         if self.several is not None:
-            readings, sides = self.several
-            return Effect(np.append(zero, readings[laser]), np.append(means, sides / sides.size))
+            readings, shares = self.several
+            return Effect(np.append(zero, readings[laser]), np.append(means, shares))
         return Effect(np.append(zero, self.lasers[laser]), np.append(means, 1.0))
 
 

@@ -9,7 +9,6 @@ For a calibrated laser, the uncertainty of the calibration applies to the covere
 readings have the uncertainty of the continued curve, and others that of the data sheet.
 """
 
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import hypot, sqrt
@@ -143,7 +142,9 @@ class SensorUncertainty:
         """Errors [m] due to linearity, according to `shapes`, and due to the difference between the scales."""
         first, second = (self._linearity(laser, shapes.lasers[laser], seen, draws) for laser in (0, 1))
         common = 0.0 if shapes.common is None else shapes.common.draws(draws.normal(len(seen)))
-        means = np.array([[0.5 * sum(each.lasers) - 0.5 * float(each.zero.mean(axis=1).sum())] for each in seen])
+        means = np.array(
+            [[0.5 * sum(each.lasers) - 0.5 * each.sides * float(each.zero.mean(axis=1).sum())] for each in seen]
+        )
         return {LINEARITY: second - first + common, SCALES: means * self.mismatch * draws.normal()}
 
     def linearity(self, laser: int, seen: Sequence[PeakReadings], draws: Draws) -> Array:
@@ -267,8 +268,9 @@ class SensorUncertainty:
         else:
             variance = step**2 / (12.0 * (1.0 + 2.0 * seen.swings[laser] / step))
         if seen.several is not None:
-            steps: Array = np.rint(seen.several[0][laser] / step)
-            alike = Counter[float](steps.tolist())
-            variance *= sum(number**2 for number in alike.values()) / alike.total() ** 2
+            readings, shares = seen.several
+            steps: Array = np.rint(readings[laser] / step)
+            alike = np.bincount((steps - steps.min()).astype(np.intp), weights=np.abs(shares))
+            variance *= float(alike @ alike)
         zero = seen.sides * step * draws.uniform(-0.5, 0.5) if seen.at_rest else 0.0
         return sqrt(variance) * draws.normal() + zero

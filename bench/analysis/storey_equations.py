@@ -21,9 +21,9 @@ free-running clocks, are projected out. With the stiffness 1 + b d + c d^2, erro
 1 + 2 b d + 3 c d^2, and so does noise: an equation has the weight 1 / (1 + |2 b d + 3 c d^2|).
 
 The coefficients of an equation are functions of the same readings, so that their noise is correlated with that of its
-right-hand side: on average, a coefficient contains the mean slope of its curve times this noise. The same applies to
-the acceleration of the second storey and to powers of the drift, but not to its rate, whose noise is a quarter of a
-period ahead.
+right-hand side: on average, a coefficient contains the mean slope of its curve times the share of its laser in this
+noise. The same applies to the acceleration of the second storey and to powers of the drift, but not to its rate, whose
+noise is a quarter of a period ahead.
 """
 
 from collections.abc import Callable, Sequence
@@ -64,13 +64,15 @@ STEP = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Equations:
-    """Equations of one test, after the projection of `removed` columns.
+    """Equations of one test, after the projection of `removed` columns: `values`, shape (number,) [m], are the sum of
 
-    The `values`, shape (number,) [m], are the sum of `rows`, shape (number, n + m + 1), times the coefficients of the
-    error curves of laser 1 and laser 2, relative to the error at rest, and the scale of laser 2 relative to that of
-    laser 1, and of `own`, shape (number, 3), times relative changes of -p and of minus the stiffness at the largest
-    drift, linear and square in it. `slopes` and `own_slopes`, shapes (n + m + 1,) and (3,), are the regression
-    coefficients of the columns on the noise of the values.
+    - `rows`, shape (number, n + m + 1), times the coefficients of the error curves of laser 1 and laser 2, relative to
+      the error at rest, and the scale of laser 2 relative to that of laser 1, and
+    - `own`, shape (number, 3), times three relative changes, reversed in sign: that of p, and those of the stiffness at
+      the largest drift in proportion to the drift and to its square.
+
+    `slopes` and `own_slopes`, shapes (n + m + 1,) and (3,), are the regression coefficients of the columns on the noise
+    of the values, for constant stiffness.
     """
 
     rows: Array
@@ -138,16 +140,17 @@ class StoreyMotion:
         return np.concatenate((*slopes, [second]))
 
     def _own_slopes(self, drift: Array) -> Array:
-        """The same of the second storey's acceleration and of the square and the cube of the `drift`."""
+        """Regression coefficients, on the noise, of the second storey's acceleration and of the square and the cube of
+        the `drift`.
+        """
         bending, differing = self._with_noise(-(self._s.imag**2) * (1.0 - self._y)), self._with_noise(2.0 - self._y)
         mean, square = float(drift[self.kept].mean()), float(np.mean(drift[self.kept] ** 2))
         return np.array([bending, 2.0 * mean * differing, 3.0 * square * differing])
 
     def _with_noise(self, product: Array) -> float:
-        """Mean, over the band, of the `product` of a response with that of the equations, relative to their noise."""
-        noise = (1.0 - self._y) ** 2 + 1.0
-        band = noise * self._window**2
-        return float(band @ (product / noise) / band.sum())
+        """Sum, over the band, of the `product` of a response with that of the equations, relative to their noise."""
+        band = self._window**2
+        return float(band @ product / (band @ ((1.0 - self._y) ** 2 + 1.0)))
 
     @cached_property
     def _y(self) -> Array:
@@ -175,16 +178,12 @@ class StoreyMotion:
         knots = np.arange(time[0], time[-1] + KNOTS, KNOTS)
         return np.maximum(1.0 - np.abs(time - knots[:, None]) / KNOTS, 0.0) * speed
 
-    @property
-    def _edge(self) -> int:
-        return _edge(self.nominal, self.rate)
-
     @cached_property
     def _size(self) -> int:
         """Number of samples of a transform: the signals, continued by their first and last values."""
         from scipy.fft import next_fast_len
 
-        return int(next_fast_len(self.readings.shape[1] + 2 * self._edge, real=True))
+        return int(next_fast_len(self.readings.shape[1] + 2 * _edge(self.nominal, self.rate), real=True))
 
     @cached_property
     def _s(self) -> NDArray[np.complex128]:
@@ -198,7 +197,7 @@ class StoreyMotion:
 
     def _filtered(self, values: Array, response: NDArray[np.complex128] | Array) -> Array:
         """`values`, shape (k, n), with a frequency `response` within the band, at the equations, shape (k, number)."""
-        edge, size = self._edge, self._size
+        edge, size = _edge(self.nominal, self.rate), self._size
         padded = np.pad(values, ((0, 0), (edge, size - edge - values.shape[1])), mode="edge")
         found = np.fft.irfft(np.fft.rfft(padded, axis=1) * (response * self._window), size, axis=1)
         return found[:, edge : edge + values.shape[1]][:, self.kept]

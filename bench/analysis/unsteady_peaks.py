@@ -9,19 +9,20 @@ peak, by 10 % if the amplitude changes by half within a few cycles, because the 
 the cycle. The uncertainties are those of the motion that occurred; they do not include how much other cycles differ.
 Where cycles are missing, no period spans the gap.
 
-Of many peaks with noise, the largest is too large and the smallest too small, by up to sqrt(2 ln N) standard deviations
-of the noise if N of them are equal. How many are nearly equal is seen from the measured peaks: by how much the largest
-would increase on average if the same noise were added to them again, which the distribution of the largest of
-independent values gives. The larger of the peaks on both sides within a period is too large for the same reason (Clark,
-C. E., 1961, Operations Research 9:145), and so is the mean over the periods. So is the largest sample of one peak, less
-the more the peak is curved.
+Of N equal peaks with noise, the largest is too large by up to sqrt(2 ln N) standard deviations of the noise, the
+smallest too small. Peaks are taken for equal if they differ by less than `NEAR` standard deviations; the bound counts
+as a rectangular distribution. The larger of the peaks on both sides within a period is too large for the same reason
+(Clark, C. E., 1961, Operations Research 9:145), and so is the mean over the periods. So is the largest sample of one
+peak, less the more the peak is curved.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from math import erfc, hypot, log, sqrt, tau
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from bench.analysis.cycles import SHARE, Cycle, mean_amplitude, mean_waves, parabola
@@ -32,10 +33,11 @@ from sim.attractor import largest_within
 
 Array = NDArray[np.float64]
 
-SPAN, PLACES = 5.0, 200
-"""Distances that are integrated over, in standard deviations of the noise, and their number."""
+NEAR = 4.0
+"""Largest difference of peaks that are taken for equal, in standard deviations of the noise."""
 
-_ERFC = np.frompyfunc(erfc, 1, 1)
+POSITIONS = 8
+"""Positions of the period, for each period, at which the peaks of the mean are described."""
 
 AGAIN = 1.0 / (sqrt(2.0) - 1.0)
 """Excess of the largest of equal values with noise, relative to the further excess if noise of the same size is added
@@ -61,26 +63,30 @@ def unsteady_peaks(cycles: Sequence[Cycle], omega: float) -> UnsteadyPeaks:
     least = min(windows, key=lambda each: each.largest.min())
     greatest = max(windows, key=lambda each: each.largest.max())
     noise, excess = max(each.noise for each in windows), max(each.excess for each in windows)
-    every = np.concatenate([each.sides for each in windows])
-    tops = every.max(axis=1)
+    tops = np.concatenate([each.largest[:: each.length] for each in windows])
+    sides = np.concatenate([each.sides for each in windows])
     u1 = max(float(cycle.extreme[U1]) for cycle in cycles)
     amplitude = mean_amplitude(cycles, ACCELERATION)
     harmonics = float(mean_waves(cycles).harmonics[ACCELERATION])
 
-    def of(drift: float, there: Array, error: float) -> SteadyPeak:
-        readings = _readings(drift, there, omega)
+    def of(drift: float, readings: PeakReadings, error: float) -> SteadyPeak:
         return SteadyPeak(drift, 0.0, 0.0, u1, amplitude, harmonics, readings, len(cycles), noise=error)
 
-    mean = float(np.concatenate([each.largest for each in windows]).mean())
-    smallest = hypot(_selected(-tops, noise), excess)
-    seen = np.array([each.seen(k) for each in windows for k in range(0, each.largest.size, each.length)])
+    mean, smallest = float(np.concatenate([each.largest for each in windows]).mean()), float(least.largest.min())
+    # the vertex of a parabola, not the largest sample
+    largest = max(float(cycle.extreme[DRIFT]) for cycle in cycles)
+    seen = np.concatenate([each.seen(each.tops[0]) for each in windows])
+    shares = np.concatenate([each.tops[1] for each in windows]) / sum(each.tops[1].sum() for each in windows)
     return UnsteadyPeaks(
-        least=of(float(least.largest.min()), least.seen(int(least.largest.argmin())), smallest),
-        mean=_mean(of(mean, _turned(seen).mean(axis=0), hypot(_averaged(every, noise), excess)), seen),
-        # the vertex of a parabola, not the largest sample
+        least=of(
+            smallest,
+            _readings(smallest, least.seen(least.top(int(least.largest.argmin())))[0], omega),
+            hypot(_selected(-tops, noise), excess),
+        ),
+        mean=of(mean, _mean(mean, seen, shares, omega), hypot(_averaged(sides, noise, len(tops)), excess)),
         greatest=of(
-            max(float(cycle.extreme[DRIFT]) for cycle in cycles),
-            greatest.seen(int(greatest.largest.argmax())),
+            largest,
+            _readings(largest, greatest.seen(greatest.top(int(greatest.largest.argmax())))[0], omega),
             _selected(tops, noise),
         ),
         used=tuple(cycles),
@@ -109,31 +115,49 @@ class _Windows:
         return cls(smooth, noise, slope, length, largest_within(np.abs(smooth[:, 0]), length))
 
     @property
+    def _positions(self) -> Array:
+        """Drift within `POSITIONS` positions of the period for each period, shape (positions, length) [m]."""
+        drift = np.ascontiguousarray(self.smooth[:, 0])
+        return sliding_window_view(drift, self.length)[:: max(self.length // POSITIONS, 1)]
+
+    @property
     def sides(self) -> Array:
-        """Largest drift on both sides in each period, one after the other, shape (periods, 2) [m]."""
-        periods = self.smooth[: len(self.smooth) // self.length * self.length, 0].reshape(-1, self.length)
-        return np.stack((periods.max(axis=1), -periods.min(axis=1)), axis=1)
+        """Largest drift on both sides at each position of the period, shape (positions, 2) [m]."""
+        within = self._positions
+        return np.stack((within.max(axis=1), -within.min(axis=1)), axis=1)
+
+    @cached_property
+    def tops(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Samples with the largest drift at the positions of the period, and the number of positions of each."""
+        within = np.abs(self._positions)
+        first = max(self.length // POSITIONS, 1) * np.arange(len(within))
+        return np.unique(first + within.argmax(axis=1), return_counts=True)
+
+    def top(self, window: int) -> NDArray[np.intp]:
+        """Sample with the largest drift at one position of the period, shape (1,)."""
+        return window + np.abs(self.smooth[window : window + self.length, :1]).argmax(axis=0)
 
     @property
     def excess(self) -> float:
         """Mean of what noise adds to a peak because the sample is the largest one: slope^2 / (2 x curvature) [m]."""
         size, step = np.abs(self.smooth[:, 0]), _half(self.length)
-        periods = size[: size.size // self.length * self.length].reshape(-1, self.length)
-        tops = np.arange(len(periods)) * self.length + periods.argmax(axis=1)
+        tops, number = self.tops
         tops = np.clip(tops, step, size.size - 1 - step)
         curvature = (2.0 * size[tops] - size[tops - step] - size[tops + step]) / step**2
-        peaks = curvature > 0.0
-        return float(np.mean(np.minimum(0.5 * self.slope**2 / curvature[peaks], self.noise))) if peaks.any() else 0.0
+        # at an end of a window the drift may not have a peak
+        bound = np.maximum(curvature, 0.5 * self.slope**2 / self.noise if self.noise else 1.0)
+        return float(np.average(0.5 * self.slope**2 / bound, weights=number))
 
-    def seen(self, window: int) -> Array:
-        """Readings of both lasers [m] at the peak within one window, their changes per cycle / (2 pi), and their ranges
-        around it, shape (3, 2).
+    def seen(self, tops: NDArray[np.intp]) -> Array:
+        """Readings of both lasers [m] at the samples `tops`, shape (n,), their changes per cycle / (2 pi), and their
+        ranges around them, shape (n, 3, 2).
         """
-        top = window + int(np.abs(self.smooth[window : window + self.length, 0]).argmax())
         step = _half(self.length)
-        first, last = max(top - step, 0), min(top + step, len(self.smooth) - 1)
-        rates = (self.smooth[last, 1:] - self.smooth[first, 1:]) * (self.length / (tau * (last - first)))
-        return np.stack((self.smooth[top, 1:], rates, np.ptp(self.smooth[first : last + 1, 1:], axis=0)))
+        first, last = np.maximum(tops - step, 0), np.minimum(tops + step, len(self.smooth) - 1)
+        lasers = self.smooth[:, 1:]
+        rates = (lasers[last] - lasers[first]) * (self.length / (tau * (last - first)))[:, None]
+        ranges = [np.ptp(lasers[begin : end + 1], axis=0) for begin, end in zip(first, last, strict=True)]
+        return np.stack((lasers[tops], rates, np.array(ranges)), axis=1)
 
 
 def _half(length: int) -> int:
@@ -174,53 +198,28 @@ def uninterrupted(cycles: Sequence[Cycle]) -> list[list[Cycle]]:
 
 
 def _selected(values: Array, noise: float) -> float:
-    """Rms error of the largest of `values`, shape (n,), each with independent `noise`."""
-    if noise == 0.0:
-        return 0.0
-    last = SPAN + sqrt(2.0 * log(values.size))
-    # distances below the largest, in standard deviations; those far below do not count
-    below = (values.max() - values) / noise
-    below = below[below <= last + SPAN]
-    x = np.linspace(-SPAN, last, PLACES)
-    probability = np.diff(_normal(x[:, None] + below).prod(axis=1))
-    middles = 0.5 * (x[1:] + x[:-1])
-    excess = float(probability @ middles)
-    variance = float(probability @ (middles - excess) ** 2)
-    return noise * hypot(sqrt(variance), AGAIN * excess)
+    """Standard uncertainty of the largest of `values`, shape (n,), each with independent `noise`."""
+    near = np.count_nonzero(values >= values.max() - NEAR * noise)
+    return noise * sqrt(1.0 + 2.0 * log(near) / 3.0)
 
 
-def _averaged(sides: Array, noise: float) -> float:
-    """Rms error of the mean, over periods, of the larger of the peaks on both `sides`, shape (n, 2), each with
-    independent `noise`.
+def _averaged(sides: Array, noise: float, periods: int) -> float:
+    """Rms error of the mean, over so many `periods`, of the larger of the peaks on both `sides`, shape (n, 2), each
+    with independent `noise`.
     """
     if noise == 0.0:
         return 0.0
-    distance = np.abs(np.diff(sides, axis=1)) / (sqrt(2.0) * noise)
-    density = np.exp(-0.5 * distance**2) / sqrt(tau)
-    excess = sqrt(2.0) * float(np.mean(density - distance * _normal(-distance)))
-    return noise * hypot(1.0 / sqrt(len(sides)), AGAIN * excess)
+    distance = np.abs(np.diff(sides, axis=1)).ravel() / (sqrt(2.0) * noise)
+    beyond = 0.5 * np.array([erfc(each / sqrt(2.0)) for each in distance.tolist()])
+    excess = sqrt(2.0) * float(np.mean(np.exp(-0.5 * distance**2) / sqrt(tau) - distance * beyond))
+    return noise * hypot(1.0 / sqrt(periods), AGAIN * excess)
 
 
-def _normal(x: Array) -> Array:
-    """Distribution function of the standard normal distribution, without `scipy.special`, which would be imported while
-    the table is driven.
-    """
-    return np.asarray(_ERFC(-x / sqrt(2.0)), dtype=np.float64) / 2.0
-
-
-def _turned(seen: Array) -> Array:
-    """What is `seen` at peaks, shape (n, 3, 2), turned to the side on which the drift is positive."""
-    return seen * np.stack((_side(seen), _side(seen), np.ones(len(seen))), axis=1)[:, :, None]
-
-
-def _side(seen: Array) -> Array:
-    """Sign of the drift at peaks, shape (n,)."""
-    return np.where(seen[:, 0, 1] < seen[:, 0, 0], -1.0, 1.0)
-
-
-def _mean(peak: SteadyPeak, seen: Array) -> SteadyPeak:
-    """The mean of several peaks, with what is `seen` at each of them, shape (n, 3, 2)."""
-    return replace(peak, readings=replace(peak.readings, several=(seen[:, 0].T, _side(seen))))
+def _mean(drift: float, seen: Array, shares: Array, omega: float) -> PeakReadings:
+    """Readings at the mean of peaks, from what is `seen` at each, shape (n, 3, 2), and their `shares`, shape (n,)."""
+    side = np.where(seen[:, 0, 1] < seen[:, 0, 0], -1.0, 1.0)
+    turned = seen * np.stack((side, side, np.ones(side.size)), axis=1)[:, :, None]
+    return replace(_readings(drift, np.tensordot(shares, turned, 1), omega), several=(seen[:, 0].T, side * shares))
 
 
 def _readings(drift: float, seen: Array, omega: float) -> PeakReadings:

@@ -56,12 +56,12 @@ def check_whole(entry: hdf5.Group, counted: Mapping[str, int], size: int) -> Non
 FORMAT, FORMAT_VERSION = "rocking-bench record", 2
 """Name and version of the format of a campaign file."""
 
-WORDING = 11
+WORDING = 12
 """Version of the sentences in journal and results. Replay compares these sentences only with those of a file of the
 same version.
 """
 
-INTERVALS = 12
+INTERVALS = 13
 """Version of the evaluation of uncertainties, of the least and mean peak of an unsteady motion, and of the predicted
 intervals of its peaks. Replay compares them only with those of a file of the same version.
 """

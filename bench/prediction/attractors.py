@@ -11,7 +11,7 @@ from bench.datafile.tables import Column, Table
 from bench.prediction.requests import AttractorRequest
 from bench.prediction.steady import predict_spectra
 from bench.progress import Progress, counting, silent
-from sim.attractor import Attractor, attractor
+from sim.attractor import KEPT, Attractor, attractor
 from sim.gain import Branch
 from sim.knowledge import SpecimenKnowledge
 from sim.linear import steady_peaks
@@ -160,7 +160,7 @@ def attractors_table(found: Sequence[LongTerm]) -> Table:
             f"{name}_{end}": numbers(
                 [values[k] for values in ends],
                 "1",
-                f"{side} value of alpha_2_{name} among the drawn specimens, until the block falls",
+                f"{side} value of alpha_2_{name} among the specimens whose block does not fall within {KEPT} cycles",
             )
             for k, name in enumerate(("least", "mean", "greatest"))
             for end, side, ends in (

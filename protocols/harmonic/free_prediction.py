@@ -8,6 +8,7 @@ from bench.prediction import attractors
 from bench.prediction.attractors import CYCLES, LongTerm, long_term
 from bench.result_cache import cached
 from protocols.harmonic.protocol import HarmonicPoint
+from sim.attractor import KEPT
 from sim.gain import predict_gain
 from sim.specimen import Specimen
 from sim.steady import NoOrbit
@@ -104,6 +105,6 @@ def _remark(found: dict[str, Any], outside: list[str]) -> str:
         number = found["counted"]
         among = f"{MEMBERS} specimens within the uncertainty"
         if number < MEMBERS:
-            among = f"the {number} of {among} whose block does not fall soon"
+            among = f"the {number} of {among} whose block does not fall within {KEPT} cycles"
         text += f" ({low:.3f} to {high:.3f} among {among}{', too few for a comparison' * (number < FEWEST)})"
     return text + apart

@@ -57,7 +57,7 @@ class Witness:
         return sliding_window_view(drift, round(drift.size / len(cycles))).max(axis=1)
 
     def peak(self, cycles: Sequence[Cycle]) -> float:
-        """Peak of the mean true cycle, relative to its mean [m]."""
+        """Peak of the mean true cycle after subtraction of its mean [m]."""
         drift = self.of(cycles)
         harmonics = np.fft.rfft(drift)[:: len(cycles)] / drift.size
         harmonics[0] = 0.0
