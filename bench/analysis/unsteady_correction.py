@@ -53,8 +53,8 @@ def revealed(
     """Corrected peaks of a motion at `omega` [rad/s] of a `frame` with a block, relative to a `reference` without it.
 
     Residuals of the equations may be correlated within `block` seconds; zero corrects nothing. None if the gain of the
-    mean peak would not have a smaller uncertainty, as after a weak motion, if cycles are missing, or for lasers on the
-    table, whose equations need its acceleration.
+    greatest peak would not have a smaller uncertainty, as after a weak motion, if cycles are missing, or for lasers on
+    the table, whose equations need its acceleration.
     """
     if not (block and frame.grounded and peaks.used and reference.used) or len(uninterrupted(peaks.used)) > 1:
         return None
@@ -70,7 +70,7 @@ def revealed(
     signals[:, DRIFT] -= zero.drift
     corrected = _relative_to(zero, unsteady_peaks(_with(peaks.used, signals), omega))
     moved = _corrected(reference, found.curves)
-    if gain(corrected.mean, moved, found).uncertainty >= gain(peaks.mean, reference, sensors).uncertainty:
+    if gain(corrected.greatest, moved, found).uncertainty >= gain(peaks.greatest, reference, sensors).uncertainty:
         return None
     return Revealed(corrected, moved, found)
 
