@@ -37,14 +37,10 @@ LIKELY = 1e-3
 """Smallest weight of a pair of candidates relative to the largest that is not neglected."""
 
 FINER = 2
-"""Number of sines for each factor of sqrt(2) between numbers of waves. The equations distinguish numbers of waves of a
-sine that differ by less: with one, 87 instead of 96 % of the intervals of drawn lasers with 3 to 6 waves contain the
-gain of a free motion (15 rad/s, beta 0.97).
+"""Number of sines for each factor of sqrt(2) between numbers of waves where the evidence counts in full: it then
+distinguishes numbers that differ by less. With one, 87 instead of 96 % of the intervals of drawn lasers with 3 to 6
+waves contain the gain of a free motion (15 rad/s, beta 0.97).
 """
-
-SINES: Array = WAVES[0] * 2.0 ** (0.5 * np.arange(FINER * (NUMBERS - 1) + 1) / FINER)
-POSSIBLE: Array = np.concatenate((np.ones(NUMBERS), np.full(SINES.size, 1.0 / FINER)))
-"""Numbers of waves of the candidates that are sines, and prior weights of all candidates."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,8 +125,11 @@ def laser_curves(
     alike = np.zeros(rows.shape[1])
     alike[: first.size + second.size] = np.concatenate((first, second))
     rows, slopes = (scales * each - np.outer(each @ alike, alike / (alike @ alike)) for each in (rows, slopes))
+    finer = FINER if caution == 1.0 else 1
+    sines = WAVES[0] * 2.0 ** (0.5 / finer * np.arange(finer * (NUMBERS - 1) + 1))
+    possible = np.concatenate((np.ones(NUMBERS), np.full(sines.size, 1.0 / finer)))
     priors = [
-        prior(places, np.eye(places.size), places, np.eye(places.size), limit, whole, sines=SINES)
+        prior(places, np.eye(places.size), places, np.eye(places.size), limit, whole, sines=sines)
         for places, limit, whole in zip((first, second), limits, ranges, strict=True)
     ]
     flexible = priors[0][FLEXIBLE], priors[1][FLEXIBLE]
@@ -139,7 +138,7 @@ def laser_curves(
         return None
     ends = np.cumsum([each.values.size for each in found]).tolist()
     observed = without_noise_in_rows(observed, rows, values, slopes, ends)
-    mean, covariance = _posterior(observed, priors[0], priors[1], caution)
+    mean, covariance = _posterior(observed, priors[0], priors[1], possible, caution)
     noise = float(np.sqrt(np.mean(observed.noise**2)))
     scales = scales[: mean.size]
     return LaserCurves((first, second), scales * mean, np.outer(scales, scales) * covariance, noise)
@@ -184,10 +183,12 @@ def _blocks(moved: Sequence[StoreyMotion], block: float) -> NDArray[np.intp]:
     return np.concatenate(firsts)
 
 
-def _posterior(observed: Observations, first: Array, second: Array, caution: float) -> tuple[Array, Array]:
+def _posterior(
+    observed: Observations, first: Array, second: Array, possible: Array, caution: float
+) -> tuple[Array, Array]:
     """Mean and covariance of the values of both curves and of the scale, for the prior covariances of the candidates
-    for the lasers, shapes (K, n, n) and (K, m, m), which are weighted by the power `caution` of their evidence. The
-    prior standard deviation of the scale and of further unknowns is 1.
+    for the lasers, shapes (K, n, n) and (K, m, m), and their prior weights `possible`, shape (K,), which are multiplied
+    by the power `caution` of their evidence. The prior standard deviation of the scale and of further unknowns is 1.
     """
     n, known = first.shape[1], first.shape[1] + second.shape[1] + 1
     rows, further = observed.rows[:, :known], observed.rows[:, known - 1 :]
@@ -197,7 +198,7 @@ def _posterior(observed: Observations, first: Array, second: Array, caution: flo
     others = others + np.diag(observed.noise**2)
     factors = np.linalg.cholesky(own[:, None] + others[None])
     white = np.linalg.solve(factors, np.broadcast_to(observed.values[:, None], (*factors.shape[:3], 1)))[..., 0]
-    likely = np.outer(POSSIBLE, POSSIBLE) * likelihoods(factors, white, caution)
+    likely = np.outer(possible, possible) * likelihoods(factors, white, caution)
     likely /= likely.max()
     likely = np.where(likely >= LIKELY, likely, 0.0)
     likely /= likely.sum()
