@@ -80,13 +80,13 @@ def unsteady_peaks(cycles: Sequence[Cycle], omega: float) -> UnsteadyPeaks:
     return UnsteadyPeaks(
         least=of(
             smallest,
-            _readings(smallest, least.seen(least.top(int(least.largest.argmin())))[0], omega),
+            _readings(smallest, least.seen_within(int(least.largest.argmin())), omega),
             hypot(_selected(-tops, noise), excess),
         ),
         mean=of(mean, _mean(mean, seen, shares, omega), hypot(_averaged(sides, noise, len(tops)), excess)),
         greatest=of(
             largest,
-            _readings(largest, greatest.seen(greatest.top(int(greatest.largest.argmax())))[0], omega),
+            _readings(largest, greatest.seen_within(int(greatest.largest.argmax())), omega),
             _selected(tops, noise),
         ),
         used=tuple(cycles),
@@ -115,10 +115,15 @@ class _Windows:
         return cls(smooth, noise, slope, length, largest_within(np.abs(smooth[:, 0]), length))
 
     @property
+    def _spacing(self) -> int:
+        """Samples between the positions of the period at which the peaks are described."""
+        return max(self.length // POSITIONS, 1)
+
+    @property
     def _positions(self) -> Array:
         """Drift within `POSITIONS` positions of the period for each period, shape (positions, length) [m]."""
         drift = np.ascontiguousarray(self.smooth[:, 0])
-        return sliding_window_view(drift, self.length)[:: max(self.length // POSITIONS, 1)]
+        return sliding_window_view(drift, self.length)[:: self._spacing]
 
     @property
     def sides(self) -> Array:
@@ -130,12 +135,7 @@ class _Windows:
     def tops(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """Samples with the largest drift at the positions of the period, and the number of positions of each."""
         within = np.abs(self._positions)
-        first = max(self.length // POSITIONS, 1) * np.arange(len(within))
-        return np.unique(first + within.argmax(axis=1), return_counts=True)
-
-    def top(self, window: int) -> NDArray[np.intp]:
-        """Sample with the largest drift at one position of the period, shape (1,)."""
-        return window + np.abs(self.smooth[window : window + self.length, :1]).argmax(axis=0)
+        return np.unique(self._spacing * np.arange(len(within)) + within.argmax(axis=1), return_counts=True)
 
     @property
     def excess(self) -> float:
@@ -147,6 +147,10 @@ class _Windows:
         # at an end of a window the drift may not have a peak
         bound = np.maximum(curvature, 0.5 * self.slope**2 / self.noise if self.noise else 1.0)
         return float(np.average(0.5 * self.slope**2 / bound, weights=number))
+
+    def seen_within(self, window: int) -> Array:
+        """What is `seen` at the sample with the largest drift at one position of the period, shape (3, 2)."""
+        return self.seen(window + np.abs(self.smooth[window : window + self.length, :1]).argmax(axis=0))[0]
 
     def seen(self, tops: NDArray[np.intp]) -> Array:
         """Readings of both lasers [m] at the samples `tops`, shape (n,), their changes per cycle / (2 pi), and their
