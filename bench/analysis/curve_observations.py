@@ -46,11 +46,16 @@ class Observations:
 
 
 def observations(
-    rows: Array, values: Array, removed: int, blocks: NDArray[np.intp], priors: tuple[Array, Array]
+    rows: Array,
+    values: Array,
+    removed: int,
+    blocks: NDArray[np.intp],
+    priors: tuple[Array, Array],
+    least: float = NOISES[0],
 ) -> Observations:
     """Useful combinations of equations, from which `removed` columns were projected out; `blocks` are the indices of
     the first equation of each block. The noise is estimated for flexible curves with the covariances `priors`; further
-    unknowns have the standard deviation 1.
+    unknowns have the standard deviation 1. `least` [m] is the smallest noise of an equation.
     """
     left, sizes, right = np.linalg.svd(rows, full_matrices=False)
     present = sizes > ROUNDING * sizes[0]
@@ -65,7 +70,7 @@ def observations(
     beside, free = max(float(values @ values - seen @ seen), 0.0), values.size - removed - seen.size
     spread = variances + NOISES[:, None] ** 2
     evidence = -0.5 * (np.sum(seen**2 / spread + np.log(spread), axis=1) + beside / NOISES**2) - free * np.log(NOISES)
-    noise = np.full(seen.size, NOISES[evidence.argmax()])
+    noise = np.full(seen.size, max(float(NOISES[evidence.argmax()]), least))
     # residuals of curves that follow correlated errors less closely show more of them
     for _ in range(2):
         noise = np.maximum(noise, _correlated(left, seen, values, blocks, variances, noise))

@@ -25,6 +25,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.analysis.column_harmonics import ColumnHarmonics
+
 Array = NDArray[np.float64]
 
 FEWEST, NUMBERS = 0.25, 13
@@ -58,13 +60,15 @@ class Harmonics:
     `readings`, shape (n,) [m], over one period at equal steps of the phase, relative to the rest position; `found`,
     shape (m,), complex [m], are the amplitudes c_k, from the order `first` on, in signal = Re(sum of c_k exp(-i k
     phase)); `uncertainty`, shape (m,) [m], is the standard uncertainty of their real and imaginary parts. `first` is 2
-    unless the motion is known, so that the fundamental tells the error of the scale.
+    unless the motion is known, so that the fundamental tells the error of the scale. `columns` are the harmonics of a
+    frame whose columns are not linear, None if there are no columns.
     """
 
     readings: Array
     found: NDArray[np.complex128]
     uncertainty: Array
     first: int = 2
+    columns: ColumnHarmonics | None = None
     _enlarged: "dict[float, Harmonics]" = field(default_factory=lambda: _none(), init=False, repr=False)
 
     @property
@@ -73,16 +77,10 @@ class Harmonics:
         return float(np.ptp(self.readings))
 
     def rounded(self, step: float) -> "Harmonics":
-        """The harmonics with the additional uncertainty due to the `step` [m] of the readings, at most that of one
-        rounding. Returns the same object for the same step.
-
-        The scatter of the cycles does not contain this uncertainty, since all cycles are rounded alike. By the sum in
-        `bench.analysis.rounding`, the mean square of the amplitude of one harmonic is zeta(3) q^3 / (pi^4 A) for a sine
-        of amplitude A, half of it in each part.
+        """The harmonics with the additional uncertainty due to the `step` [m] of the readings (`rounding`). Returns the
+        same object for the same step.
         """
-        swing = max(0.5 * self.swing, step, np.finfo(np.float64).tiny)
-        rounding = min(sqrt(0.5 * ZETA_3 * step**3 / (pi**4 * swing)), step / sqrt(12.0))
-        return self.with_uncertainty(rounding)
+        return self.with_uncertainty(rounding(self.swing, step))
 
     def with_uncertainty(self, uncertainty: float) -> "Harmonics":
         """The harmonics with an additional standard `uncertainty` [m] of each part. Returns the same object for the
@@ -95,6 +93,18 @@ class Harmonics:
 
 def _none() -> dict[float, Harmonics]:
     return {}
+
+
+def rounding(swing: float, step: float) -> float:
+    """Standard uncertainty [m] of both parts of a harmonic of a reading in steps of `step` [m], with the span `swing`
+    [m]: at most that of one rounding.
+
+    The scatter of the cycles does not contain it, since all cycles are rounded alike. By the sum in
+    `bench.analysis.rounding`, the mean square of the amplitude of one harmonic is zeta(3) q^3 / (pi^4 A) for a sine of
+    amplitude A, half of it in each part.
+    """
+    amplitude = max(0.5 * swing, step, np.finfo(np.float64).tiny)
+    return min(sqrt(0.5 * ZETA_3 * step**3 / (pi**4 * amplitude)), step / sqrt(12.0))
 
 
 Checks = tuple[Harmonics, Harmonics]

@@ -8,6 +8,7 @@ from math import hypot, inf, sqrt, tau
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.analysis.column_harmonics import column_harmonics
 from bench.analysis.cycles import Cycle, Waves, mean_amplitude, mean_waves
 from bench.analysis.draws import Draws
 from bench.analysis.error_curve import Checks, Harmonics
@@ -186,15 +187,17 @@ def _checks(cycles: Sequence[Cycle], waves: Waves, omega: float, frame: LinearFr
     table = np.array([cycle.harmonics(ACCELERATION)[1:fitted] for cycle in cycles]).mean(axis=0)
     orders = range(2, table.size + 2)
     moved = np.array([frame.readings(k * omega, complex(z)) for k, z in zip(orders, table, strict=True)]).reshape(-1, 2)
+    bent = column_harmonics(frame.specimen.frame, omega, waves.waveform[:, [U1, DRIFT]].T, orders)
     found = list[Harmonics]()
-    for column, real in zip((LASER_1, LASER_2), moved.T, strict=True):
+    for column, real, columns in zip((LASER_1, LASER_2), moved.T, bent, strict=True):
         each = np.array([cycle.harmonics(column)[1:fitted] for cycle in cycles])
         scatter = np.sqrt(0.5 * np.mean(np.abs(each - each.mean(axis=0)) ** 2, axis=0) / max(len(cycles) - 1, 1))
         readings = waves.waveform[:, column]
         step = max(readings.size // CHECK_PLACES, 1)
         # Im(z exp(i k phase)) is Re(c exp(-i k phase)) with c = i z*
         error = 1j * (each.mean(axis=0) - real).conj()
-        found.append(Harmonics(readings[::step], error, np.hypot(scatter, FRAME_SHARE * np.abs(real))))
+        noise = np.hypot(scatter, FRAME_SHARE * np.abs(real))
+        found.append(Harmonics(readings[::step], error, noise, columns=columns))
     return found[0], found[1]
 
 

@@ -8,6 +8,7 @@ from bench.analysis.draws import SharedDraws
 from bench.analysis.gain import DRAWS, SEED, Gain, SteadyPeak, gain
 from bench.analysis.peak_readings import PeakReadings, Shapes
 from bench.analysis.sensor_uncertainty import SensorUncertainty
+from bench.analysis.steady_correction import without_errors
 
 CHANGED = 0.003
 """Change of a reading, relative to the swing of its laser, below which a running gain keeps the lasers' errors."""
@@ -23,12 +24,14 @@ class RunningGain:
     """
 
     def __init__(self, bare: SteadyPeak, sensors: SensorUncertainty, shared: SharedDraws) -> None:
-        self._bare, self._shared = bare, shared
+        self._shared = shared
         self._sensors = sensors.checked_by(bare.checks)
+        self._bare = self._corrected(bare)
         self._kept: tuple[PeakReadings, Shapes] | None = None
 
     def of(self, coupled: SteadyPeak) -> Gain:
         """Gain for the drift peak `coupled` measured so far."""
+        coupled = self._corrected(coupled)
         shapes: Shapes | None = None
         if self._kept is not None and not _changed(self._kept[0], coupled.readings):
             at, kept = self._kept
@@ -38,6 +41,11 @@ class RunningGain:
         if shapes is None:
             self._kept = coupled.readings, found.shapes
         return found
+
+    def _corrected(self, peak: SteadyPeak) -> SteadyPeak:
+        """The peak without the errors of the lasers that are already known."""
+        curves = self._sensors.curves
+        return peak if curves is None else without_errors(peak, curves)
 
 
 def _changed(before: PeakReadings, after: PeakReadings) -> bool:

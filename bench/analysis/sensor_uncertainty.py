@@ -16,13 +16,15 @@ from math import hypot, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.analysis.curve_posterior import LaserCurves
 from bench.analysis.draws import Draws
 from bench.analysis.error_curve import CAUTION, Checks, Harmonics, widest
 from bench.analysis.laser_calibration import LaserCalibration
-from bench.analysis.laser_curves import LaserCurves, laser_curves
+from bench.analysis.laser_curves import laser_curves
 from bench.analysis.linearity import SMOOTH, Effect, LinearFrame, LinearityErrors, linearity_errors
 from bench.analysis.peak_readings import PeakReadings, Shapes, beyond, shares_of
 from bench.analysis.sensor_accuracy import SensorAccuracy
+from bench.analysis.steady_curves import StoreyTest, steady_curves
 
 Array = NDArray[np.float64]
 
@@ -112,6 +114,17 @@ class SensorUncertainty:
             return self
         first, second = (self.accuracy.laser_linearity * whole for whole in self.ranges)
         curves = laser_curves(tests, frame, sample_rate, (first, second), self.ranges, self.mismatch, block, caution)
+        return self if curves is None else replace(self, checks=(), corrected=True, curves=curves)
+
+    def found_by_harmonics(self, *tests: StoreyTest) -> "SensorUncertainty":
+        """A copy for steady peaks corrected for the errors that the checks, and the second storey in `tests`, reveal
+        (`bench.analysis.steady_curves`); the same object without checks, and for calibrated lasers.
+        """
+        if self.calibration is not None or not self.checks:
+            return self
+        first, second = (self.accuracy.laser_linearity * whole for whole in self.ranges)
+        checks = tuple(self.checks_of(0)), tuple(self.checks_of(1))
+        curves = steady_curves(checks, tests, (first, second), self.ranges, self.mismatch)
         return self if curves is None else replace(self, checks=(), corrected=True, curves=curves)
 
     def checks_of(self, laser: int) -> list[Harmonics]:

@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 from bench.analysis.cycles import TRACES, Cycle, extremes
 from bench.analysis.drift_zero import DriftZero, drift_zero
 from bench.analysis.gain import SteadyPeak, gain
-from bench.analysis.laser_curves import LaserCurves
 from bench.analysis.linearity import LinearFrame
 from bench.analysis.reading_correction import ReadingCorrection
 from bench.analysis.sensor_uncertainty import SensorUncertainty
 from bench.analysis.signals import DRIFT, SIGNALS
+from bench.analysis.steady_correction import without_errors
 from bench.analysis.unsteady_peaks import UnsteadyPeaks, uninterrupted, unsteady_peaks
 
 Array = NDArray[np.float64]
@@ -69,7 +69,7 @@ def revealed(
         return None
     signals[:, DRIFT] -= zero.drift
     corrected = _relative_to(zero, unsteady_peaks(_with(peaks.used, signals), omega))
-    moved = _corrected(reference, found.curves)
+    moved = without_errors(reference, found.curves)
     if gain(corrected.greatest, moved, found).uncertainty >= gain(peaks.greatest, reference, sensors).uncertainty:
         return None
     return Revealed(corrected, moved, found)
@@ -101,11 +101,3 @@ def _relative_to(zero: DriftZero, peaks: UnsteadyPeaks) -> UnsteadyPeaks:
         for each in (peaks.least, peaks.mean, peaks.greatest)
     )
     return replace(peaks, least=least, mean=mean, greatest=greatest)
-
-
-def _corrected(peak: SteadyPeak, curves: LaserCurves) -> SteadyPeak:
-    """A steady peak without the expected errors of its readings."""
-    first, second = (peak.readings.effect(laser) for laser in (0, 1))
-    error = second.weights @ curves.expected(1, second.places) - first.weights @ curves.expected(0, first.places)
-    drift = peak.drift - peak.readings.sign * float(error)
-    return replace(peak, drift=drift, readings=replace(peak.readings, drift=drift))

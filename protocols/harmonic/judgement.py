@@ -9,6 +9,7 @@ from bench.analysis.free_motion import FreeMotion, Rate
 from bench.analysis.gain import Gain, SteadyPeak, gain, without_rounding
 from bench.analysis.linearity import LinearFrame
 from bench.analysis.sensor_uncertainty import SensorUncertainty
+from bench.analysis.steady_correction import corrected
 from bench.analysis.uncertainty import plus_minus
 from bench.analysis.unsteady_correction import revealed
 from bench.config.model import BenchConfiguration
@@ -44,8 +45,8 @@ class Conditions:
 
     `reference` is the bare frame's dwell at the same frequency, `known` the uncertainty of the `specimen`. Stability on
     the table is predicted with the model `shaker`, if there is one; `harmonics` is the number of harmonics of the
-    table's motion that are controlled. In an unsteady motion, errors of the lasers are found according to the model of
-    the bare `frame`, with residuals that may be correlated for `block` seconds; not without a frame.
+    table's motion that are controlled. Errors of the lasers are found according to the model of the bare `frame`, in an
+    unsteady motion with residuals that may be correlated for `block` seconds; not without a frame, or if it is zero.
     """
 
     omega: float
@@ -81,12 +82,24 @@ class Conditions:
             parameters.laser_block or 0.0,
         )
 
-    def corrected(self, peak: SteadyPeak) -> SteadyPeak:
-        """The peak without the rounding errors of calibrated lasers; of others, the linearity errors are larger."""
+    def rounded(self, peak: SteadyPeak) -> SteadyPeak:
+        """The peak without the rounding errors of calibrated lasers."""
         step = self.sensors.accuracy.laser_resolution
         if self.sensors.calibration is None or step == 0.0:
             return peak
         return without_rounding(peak, self.omega, step)
+
+    def corrected(self, peak: SteadyPeak) -> tuple[SteadyPeak, "Conditions"]:
+        """A periodic peak without the rounding errors of calibrated lasers, or without the linearity errors of others
+        that the harmonics of the tests reveal; and the conditions of its gain.
+        """
+        peak = self.rounded(peak)
+        if self.frame is None or not self.block:
+            return peak, self
+        found = corrected(peak, self.reference.peak, self.sensors, self.frame, self.omega)
+        if found is None:
+            return peak, self
+        return found.peak, replace(self, reference=replace(self.reference, peak=found.reference), sensors=found.sensors)
 
     def branches(self, peak: SteadyPeak) -> dict[str, Branch]:
         """Predicted branches at the measured amplitudes of the table."""
@@ -154,30 +167,31 @@ def judge(settled: Settled, conditions: Conditions, starts: int, held: Held | No
 
     If the motion is not steady or the orbit is unstable, stability is also predicted on the table. If the motion was
     then `held` on the rocking orbit, gain and comparison are for the held motion, and the free motion is described in
-    addition. Peaks measured by calibrated lasers and those of unsteady motions are corrected, which takes up to half a
-    second.
+    addition. Peaks are corrected for errors of the lasers, which takes up to half a second.
     """
-    conditions = replace(conditions, reference=_corrected(conditions.reference, conditions))
-    settled, alone = _revealed(_corrected(settled, conditions), conditions)
-    peak, bare, shaker = settled.peak, alone.reference.peak, conditions.shaker
+    reference = conditions.reference
+    if reference.steadiness.steady:
+        conditions = replace(conditions, reference=replace(reference, peak=conditions.rounded(reference.peak)))
+    settled, own = _corrected(settled, conditions)
+    peak, bare, shaker = settled.peak, own.reference.peak, conditions.shaker
     branches = conditions.branches(peak)
     steady = settled.steadiness.steady
     name = (nearest_branch(branches, peak.drift, peak.u1) if steady else None) or _ROCKING
     status = (PointStatus.STEADY if name == _ROCKING else PointStatus.RESTING) if steady else PointStatus.MODULATED
-    comparison = conditions.comparison(name, branches.get(name), peak)
+    comparison = (own if steady else conditions).comparison(name, branches.get(name), peak)
     # an unsteady motion has the gain at the amplitude that occurred, which no branch describes
-    measured, agrees = comparison.compare(peak) if steady else (alone.gain(peak), None)
+    measured, agrees = comparison.compare(peak) if steady else (own.gain(peak), None)
     on_table = None
     if shaker is not None and _ROCKING in branches and not (steady and branches[name].stable):
         on_table = _table_multiplier(branches[_ROCKING], shaker, conditions.harmonics)
-    free = _free_fields(settled.motion, alone)
+    free = _free_fields(settled.motion, own)
     orbit: dict[str, Any] = {}
     if settled.orbit is not None:
         gained, same = comparison.compare(settled.orbit)
         orbit = {"alpha_2_orbit": gained.alpha_2, "alpha_2_orbit_uncertainty": gained.uncertainty, "orbit_agrees": same}
     remarks = (
         *_remarks(settled, conditions.reference, name, branches, agrees, on_table, free, orbit),
-        *alone.sensors.rough(measured.shapes),
+        *own.sensors.rough(measured.shapes),
     )
     point = HarmonicPoint(
         omega_rad_s=conditions.omega,
@@ -197,32 +211,30 @@ def judge(settled: Settled, conditions: Conditions, starts: int, held: Held | No
     return point if held is None else _held_point(point, held, conditions)
 
 
-def _corrected(settled: Settled, conditions: Conditions) -> Settled:
-    """A dwell with its corrected peak if it is steady; the peaks of other motions are those of single cycles."""
-    return replace(settled, peak=conditions.corrected(settled.peak)) if settled.steadiness.steady else settled
-
-
-def _revealed(settled: Settled, conditions: Conditions) -> tuple[Settled, Conditions]:
-    """An unsteady dwell without the errors of the lasers that it reveals, and the conditions of its gain; both as they
-    are if it reveals none, or if the peak was asked for in another way.
+def _corrected(settled: Settled, conditions: Conditions) -> tuple[Settled, Conditions]:
+    """A dwell without the errors of the lasers that it reveals, and the conditions of its gain; both as they are if it
+    reveals none, or if the peak of an unsteady dwell was asked for in another way.
     """
+    if settled.steadiness.steady:
+        peak, own = conditions.corrected(settled.peak)
+        return replace(settled, peak=peak), own
     motion, reference, frame = settled.motion, conditions.reference, conditions.frame
     if motion is None or frame is None or settled.peak.drift != motion.peaks.greatest.drift:
         return settled, conditions
     found = revealed(motion.peaks, reference.peak, conditions.sensors, frame, conditions.omega, conditions.block)
     if found is None:
         return settled, conditions
-    alone = replace(conditions, reference=replace(reference, peak=found.reference), sensors=found.sensors)
-    return replace(settled, peak=found.peaks.greatest, motion=replace(motion, peaks=found.peaks)), alone
+    own = replace(conditions, reference=replace(reference, peak=found.reference), sensors=found.sensors)
+    return replace(settled, peak=found.peaks.greatest, motion=replace(motion, peaks=found.peaks)), own
 
 
 def _held_point(free: HarmonicPoint, held: Held, conditions: Conditions) -> HarmonicPoint:
     """The point of a free motion that was then held; if it was not held on the orbit, only a remark is added."""
-    peak = None if held.peak is None else conditions.corrected(held.peak)
-    if peak is None:
+    if held.peak is None:
         released = f"the hold of the motion on its orbit was released after cycle {held.cycles}"
         text = f"{released if held.cycles else 'the motion could not be held on its orbit'}: {held.reason}"
         return _remarked(free, text)
+    peak, conditions = conditions.corrected(held.peak)
     branches = conditions.branches(peak)
     if nearest_branch(branches, peak.drift, peak.u1) != _ROCKING:
         return _remarked(free, "the held motion is not on the rocking orbit")

@@ -293,7 +293,10 @@ class HarmonicPlan:
         gain: RunningGain | None = None
         predicted = float("nan")
         if specimen is not None and reference is not None:
-            gain = RunningGain(reference.peak, self._sensors, self._draws)
+            sensors = self._sensors
+            if self._parameters.laser_block:
+                sensors = sensors.found_by_harmonics()
+            gain = RunningGain(reference.peak, sensors, self._draws)
             branch = self._target_branch(specimen, omega)
             predicted = branch.alpha_2 if branch else predicted
         return RunningPoint(omega, specimen.label if specimen else None, gain, predicted, self._pace)

@@ -65,6 +65,7 @@ LONGEST = 200
 
 ASKED, CONFIGURATION = HarmonicParameters(), BenchConfiguration()
 NOMINAL = CONFIGURATION.known_specimen
+FRAME = LinearFrame(NOMINAL.bare(), grounded=True)
 LEVEL = ASKED.amplitude_factor * NOMINAL.uplift_acceleration
 
 
@@ -189,8 +190,8 @@ class Score:
 def _settled(test: Observed, omega: float, *, linear: bool) -> Settled:
     cycles = list(test.cycles)
     measured = ASKED.measured_cycles
-    frame = LinearFrame(NOMINAL.bare(), grounded=True) if linear else None
-    peak = steady_peak(cycles[-measured:], omega, before=cycles[TRANSIENT:-measured], frame=frame)
+    before, frame = cycles[TRANSIENT:-measured], FRAME if linear else None
+    peak = steady_peak(cycles[-measured:], omega, before=before, frame=frame)
     return Settled(peak, Steadiness(True, 0.0, 0.0, 1), test.waited * tau / omega, 0.0, 0.0, 0)
 
 
@@ -200,7 +201,9 @@ def score(each: Bench) -> Score:
     sensors = checked(SensorUncertainty(ACCURACY, RANGES, each.calibration), references)
     tests = references[0], _settled(each.coupled, each.omega, linear=False)
     specimen = NOMINAL.coupled(each.specimen.label or 0.0)
-    point = judge(tests[1], Conditions(each.omega, specimen, CONFIGURATION.known, tests[0], sensors), 1)
+    block = ASKED.laser_block or 0.0
+    conditions = Conditions(each.omega, specimen, CONFIGURATION.known, tests[0], sensors, frame=FRAME, block=block)
+    point = judge(tests[1], conditions, 1)
     assert point.alpha_2 is not None
     assert point.alpha_2_uncertainty is not None
     stated = predict_gain(each.specimen, each.omega, tests[1].peak.amplitude, tests[0].peak.amplitude).rocking

@@ -11,8 +11,9 @@ from scipy import signal
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 
+from bench.analysis.curve_posterior import LaserCurves
 from bench.analysis.draws import Draws
-from bench.analysis.laser_curves import LaserCurves, laser_curves
+from bench.analysis.laser_curves import laser_curves
 from bench.analysis.linearity import Effect, LinearFrame
 from bench.analysis.peak_readings import PeakReadings
 from bench.analysis.sensor_accuracy import SensorAccuracy

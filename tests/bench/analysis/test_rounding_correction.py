@@ -103,9 +103,9 @@ def test_the_peak_of_the_drift_is_corrected_if_the_lasers_are_calibrated() -> No
     sensors = SensorUncertainty(SensorAccuracy(laser_resolution=STEP), (0.2, 0.2))
     reference = Settled(peak, Steadiness(True, 0.0, 0.0, 1), 60.0, 0.0, 0.0, 0)
     conditions = Conditions(OMEGA, Specimen().coupled(0.25), SpecimenKnowledge(), reference, sensors)
-    assert conditions.corrected(peak) is peak
+    assert conditions.corrected(peak) == (peak, conditions)
     calibrated = replace(sensors, calibration=calibration(-0.05, 0.05))
-    corrected = replace(conditions, sensors=calibrated).corrected(peak)
+    corrected, _ = replace(conditions, sensors=calibrated).corrected(peak)
     fitted = peak.readings.fitted
     assert fitted is not None
     found = estimated(cycles, fitted.phase)
