@@ -56,9 +56,9 @@ class HarmonicParameters(SineParameters, HarmonicPoints):
     laser_block: float | None = quantity(
         4.0,
         "s",
-        "the errors of the lasers, or what a calibration leaves of them, are found from the motion of the second "
-        "storey where it is not steady, with residuals that may be correlated for this long; 0: as stated by the data "
-        "sheet, the tests of the bare frame or the calibration",
+        "the errors of the lasers are found from the harmonics of steady tests if the lasers are not calibrated, and "
+        "from the motion of the second storey where it is not steady, with residuals that may be correlated for this "
+        "long; 0: as stated by the data sheet, the tests of the bare frame or the calibration",
         ge=0,
         le=60,
         usual=(0.5, 20.0),
