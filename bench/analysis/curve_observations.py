@@ -13,7 +13,7 @@ noise in the rows that is independent of that of the values is neglected: it is 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -34,13 +34,35 @@ NOISES: Array = np.geomspace(1e-8, 1e-3, 240)
 @dataclass(frozen=True, eq=False)
 class Observations:
     """Observed `values`, shape (k,), of linear functions of the unknowns, `rows`, shape (k, unknowns), with independent
-    `noise`, shape (k,), given as standard deviation. `transform`, shape (unknowns, k): values = transform^T rows^T
-    values of the equations. `expected`, shape (unknowns,), is the posterior mean of the unknowns for flexible curves.
+    `noise`, shape (k,), given as standard deviation.
     """
 
     rows: Array
     values: Array
     noise: Array
+
+    def beside(self, other: "Observations", common: int) -> "Observations":
+        """These and the `other` ones, with the first `common` unknowns in common; the further ones of the other
+        follow those of these.
+        """
+        own, others = self.rows.shape[1] - common, other.rows.shape[1] - common
+        rows = np.concatenate(
+            (
+                np.pad(self.rows, ((0, 0), (0, others))),
+                np.insert(other.rows, [common] * own, 0.0, axis=1),
+            )
+        )
+        return Observations(
+            rows, np.concatenate((self.values, other.values)), np.concatenate((self.noise, other.noise))
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Combined(Observations):
+    """Observations that are combinations of equations. `transform`, shape (unknowns, k): values = transform^T rows^T
+    values of the equations. `expected`, shape (unknowns,), is the posterior mean of the unknowns for flexible curves.
+    """
+
     transform: Array
     expected: Array
 
@@ -52,7 +74,7 @@ def observations(
     blocks: NDArray[np.intp],
     priors: tuple[Array, Array],
     least: float = NOISES[0],
-) -> Observations:
+) -> Combined:
     """Useful combinations of equations, from which `removed` columns were projected out; `blocks` are the indices of
     the first equation of each block. The noise is estimated for flexible curves with the covariances `priors`; further
     unknowns have the standard deviation 1. `least` [m] is the smallest noise of an equation.
@@ -76,7 +98,7 @@ def observations(
         noise = np.maximum(noise, _correlated(left, seen, values, blocks, variances, noise))
     useful = variances > USEFUL * noise**2
     combined, seen, noise = combined[useful], seen[useful], noise[useful]
-    return Observations(
+    return Combined(
         rows=combined,
         values=seen,
         noise=noise,
@@ -102,7 +124,7 @@ def _correlated(
 
 
 def without_noise_in_rows(
-    observed: Observations, rows: Array, values: Array, slopes: Array, ends: Sequence[int]
+    observed: Combined, rows: Array, values: Array, slopes: Array, ends: Sequence[int]
 ) -> Observations:
     """`observed` without the expected contribution of the noise in the rows.
 
@@ -113,8 +135,6 @@ def without_noise_in_rows(
     residual = values - rows @ observed.expected
     squares = np.array([residual[begin:end] @ residual[begin:end] for begin, end in pairwise((0, *ends))])
     across = slopes @ observed.transform
-    return replace(
-        observed,
-        rows=observed.rows - (across.T * squares) @ slopes,
-        values=observed.values - squares @ across,
+    return Observations(
+        observed.rows - (across.T * squares) @ slopes, observed.values - squares @ across, observed.noise
     )

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.analysis.bare_harmonics import PROPERTIES, Both, bare_numbers, largest_drifts, observed_by, spreads
 from bench.analysis.curve_observations import observations, without_noise_in_rows
 from bench.analysis.curve_posterior import Candidates, LaserCurves
 from bench.analysis.error_curve import CAUTION, block_diagonal
@@ -35,6 +36,7 @@ def laser_curves(
     mismatch: float,
     block: float,
     caution: float = CAUTION,
+    checks: Both = ((), ()),
 ) -> LaserCurves | None:
     """Curves according to the signals of `tests` with the same lasers, shape (n, len(SIGNALS)) each, of a `frame` with
     or without block; None if no test has a strong motion that is long and complete enough, or if the motions tell
@@ -42,7 +44,8 @@ def laser_curves(
 
     `limits` are the largest linearity errors and `ranges` the measuring ranges of the lasers [m]; `mismatch` is the
     standard uncertainty of the ratio of their scales. Residuals may be correlated within `block` seconds. Pairs of
-    candidates are weighted by the power `caution` of their evidence.
+    candidates are weighted by the power `caution` of their evidence. The `checks` are harmonics of tests of the bare
+    frame, which observe the curves as well.
     """
     moved = [found for each in tests if (found := storey_motion(each, frame, sample_rate)) is not None]
     if not moved or 0.0 in limits:
@@ -65,7 +68,14 @@ def laser_curves(
     if not observed.values.size:
         return None
     ends = np.cumsum([each.values.size for each in found]).tolist()
-    return candidates.curves(without_noise_in_rows(observed, rows, values, slopes, ends), scales)
+    found_here = without_noise_in_rows(observed, rows, values, slopes, ends)
+    if not any(checks):
+        return candidates.curves(found_here, scales)
+    known, further = first.size + second.size + 1, rows.shape[1] - first.size - second.size
+    harmonics = bare_numbers(checks, candidates.bases, largest_drifts(checks))
+    both = found_here.beside(observed_by(harmonics, candidates, limits), known)
+    units = np.concatenate((scales, np.ones(both.rows.shape[1] - scales.size)))
+    return candidates.curves(both, units, spreads(further, PROPERTIES))
 
 
 def _joined(found: Sequence[Equations]) -> tuple[Array, Array]:

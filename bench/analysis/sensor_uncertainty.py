@@ -16,6 +16,7 @@ from math import hypot, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.analysis.bare_harmonics import Both
 from bench.analysis.curve_posterior import LaserCurves
 from bench.analysis.draws import Draws
 from bench.analysis.error_curve import CAUTION, Checks, Harmonics, widest
@@ -103,17 +104,27 @@ class SensorUncertainty:
         return replace(self, checks=() if checks is None else (checks,), corrected=True)
 
     def found_in(
-        self, tests: Sequence[Array], frame: LinearFrame, sample_rate: float, block: float, caution: float = CAUTION
+        self,
+        tests: Sequence[Array],
+        frame: LinearFrame,
+        sample_rate: float,
+        block: float,
+        caution: float = CAUTION,
+        *,
+        checked: bool = False,
     ) -> "SensorUncertainty":
         """A copy for readings corrected for the errors that the signals of `tests` reveal, with residuals that may be
         correlated for `block` seconds (`bench.analysis.laser_curves`); the same object if `block` is zero, or if the
         tests reveal none. What is left of the errors of calibrated lasers, also beyond the calibrated readings, is
-        found in the same way. Possible shapes are weighted by the power `caution` of their evidence.
+        found in the same way. Possible shapes are weighted by the power `caution` of their evidence; `checked` states
+        whether the checks contribute.
         """
         if not block:
             return self
         first, second = (self.accuracy.laser_linearity * whole for whole in self.ranges)
-        curves = laser_curves(tests, frame, sample_rate, (first, second), self.ranges, self.mismatch, block, caution)
+        checks = self._evaluated if checked else ((), ())
+        limits = first, second
+        curves = laser_curves(tests, frame, sample_rate, limits, self.ranges, self.mismatch, block, caution, checks)
         return self if curves is None else replace(self, checks=(), corrected=True, curves=curves)
 
     def found_by_harmonics(self, *tests: StoreyTest) -> "SensorUncertainty":
@@ -123,9 +134,12 @@ class SensorUncertainty:
         if self.calibration is not None or not self.checks:
             return self
         first, second = (self.accuracy.laser_linearity * whole for whole in self.ranges)
-        checks = tuple(self.checks_of(0)), tuple(self.checks_of(1))
-        curves = steady_curves(checks, tests, (first, second), self.ranges, self.mismatch)
+        curves = steady_curves(self._evaluated, tests, (first, second), self.ranges, self.mismatch)
         return self if curves is None else replace(self, checks=(), corrected=True, curves=curves)
+
+    @property
+    def _evaluated(self) -> Both:
+        return tuple(self.checks_of(0)), tuple(self.checks_of(1))
 
     def checks_of(self, laser: int) -> list[Harmonics]:
         """The checks of laser 0 or 1 that are evaluated, with the uncertainty due to its resolution."""

@@ -1,18 +1,10 @@
 """Error curves of both lasers, from the harmonics of steady tests.
 
-In a test of the bare frame, which is linear, the harmonics of each reading are those of its error
-(`bench.analysis.error_curve`). With a block, the storeys move with harmonics of their own, but only the upper columns
-move the second one: the equation of `bench.analysis.storey_equations`, here for each harmonic of the mean cycle,
-relates both errors over the readings of this test, which may leave those of the bare frame.
-
-What else may be in these numbers are unknowns: stiffness of either storey that depends on the drift, and dry friction,
-alike in all tests (`bench.analysis.column_harmonics`); in a test with a block also other ratios of mass and damping to
-stiffness than the assumed ones, and a delay between the lasers. How far the columns are from linear ones is unknown as
-well: few harmonics hardly tell, and allowing for much widens the interval of a linear frame. Several sizes are
-therefore weighted by their evidence, as the shapes of the curves are.
-
-All numbers are divided by their standard deviations. Further errors of the model make them scatter more than these: the
-ratio with the largest evidence, if it is above 1, widens all of them (`bench.analysis.curve_observations`).
+Those of the bare frame tell the errors over its readings (`bench.analysis.bare_harmonics`). With a block, the storeys
+move with harmonics of their own, but only the upper columns move the second one: the equation of
+`bench.analysis.storey_equations`, here for each harmonic of the mean cycle, relates both errors over the readings of
+this test, which may leave those of the bare frame. Unknown in it are also the mass and damping of the second storey
+relative to its stiffness, and a delay between the lasers.
 """
 
 from collections.abc import Sequence
@@ -22,11 +14,20 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.analysis.bare_harmonics import (
+    PROPERTIES,
+    Both,
+    Numbers,
+    bare_numbers,
+    largest_drifts,
+    observed_by,
+    parted,
+    spreads,
+)
 from bench.analysis.column_harmonics import FORCES, ColumnHarmonics, amplitudes, forces
-from bench.analysis.curve_observations import observations
 from bench.analysis.curve_posterior import Basis, Candidates, LaserCurves
 from bench.analysis.cycles import HARMONICS, Cycle, mean_waves
-from bench.analysis.error_curve import CAUTION, LEAST, Harmonics, block_diagonal, rounding
+from bench.analysis.error_curve import CAUTION, rounding
 from bench.analysis.linearity import LinearFrame
 from bench.analysis.sensor_accuracy import SensorAccuracy
 from bench.analysis.signals import ACCELERATION, LASER_1, LASER_2
@@ -34,36 +35,11 @@ from bench.analysis.signals import ACCELERATION, LASER_1, LASER_2
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-UNIT = 1e-6
-"""Standard deviation to which all numbers are scaled [m]."""
-
 PLACES = 64
 """Number of points of a cycle at which the readings are evaluated."""
 
-NOT_LINEAR: Array = np.array([0.001, 0.01, 0.1])
-"""Possible standard deviations of the forces of columns that are not linear, relative to the linear one at the largest
-drift; friction has a tenth of them.
-"""
-
-PROPERTIES = 0.1
+KNOWN = 0.1
 """Standard deviations of the second storey's mass and damping, relative to its stiffness."""
-
-LEAST_DRIFT = 1e-9
-"""Smallest drift to which they are relative [m]."""
-
-
-@dataclass(frozen=True, eq=False)
-class Numbers:
-    """Measured numbers as linear functions of the unknowns: `values`, shape (n,) [m], with the standard deviations
-    `noise`, shape (n,) [m]; `rows`, shape (n, unknowns), for the curves of laser 1 and laser 2, the scale of laser 2
-    relative to that of laser 1, the columns of both storeys, and mass and damping of the second one; and `late`, shape
-    (n, 0) or (n, 1), for an unknown of this test alone.
-    """
-
-    values: Array
-    noise: Array
-    rows: Array
-    late: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +98,7 @@ class StoreyTest:
                 upper[:, None] * amplitudes(bases[1](self.readings[1]))[fitted],
                 mismatch * (upper * second)[:, None],
                 ColumnHarmonics(bent, np.array([largest[0], own])).scaled(largest),
-                PROPERTIES * changes,
+                KNOWN * changes,
             ),
             axis=1,
             dtype=np.complex128,
@@ -135,12 +111,12 @@ class StoreyTest:
         ]
         noise = np.sqrt(scatter**2 + steps[0] ** 2 + steps[1] ** 2)
         late = (self.late * upper * s * second)[:, None]
-        return Numbers(_parted(found), np.tile(noise, 2), _parted(rows), _parted(late))
+        return Numbers(parted(found), np.tile(noise, 2), parted(rows), parted(late))
 
 
 @lru_cache(maxsize=4)
 def steady_curves(
-    checks: tuple[tuple[Harmonics, ...], tuple[Harmonics, ...]],
+    checks: Both,
     tests: tuple[StoreyTest, ...],
     limits: tuple[float, float],
     ranges: tuple[float, float],
@@ -160,39 +136,13 @@ def steady_curves(
         for laser, found in enumerate(checks)
     )
     candidates = Candidates.over((first, second), limits, ranges, CAUTION)
-    bases = candidates.bases
-    drifts = [each.columns.largest for found in checks for each in found if each.columns is not None]
-    largest = np.max([*drifts, *(np.array([0.0, each.drift]) for each in tests)], axis=0, initial=LEAST_DRIFT)
-    found = [_bare(each, laser, bases, largest) for laser, every in enumerate(checks) for each in every]
-    found += [each.numbers(bases, mismatch, largest) for each in tests]
-    rows = np.concatenate([each.rows for each in found])
-    noise = np.hypot(np.concatenate([each.noise for each in found]), LEAST * min(limits)) / UNIT
-    rows = np.concatenate((rows, block_diagonal([each.late for each in found])), axis=1) / noise[:, None]
-    values = np.concatenate([each.values for each in found]) / noise
-    starts = np.cumsum([0, *(each.values.size for each in found[:-1])])
-    observed = observations(rows, values, 0, starts, candidates.flexible, least=UNIT)
+    largest = np.max([largest_drifts(checks), *(np.array([0.0, each.drift]) for each in tests)], axis=0)
+    found = bare_numbers(checks, candidates.bases, largest)
+    found += [each.numbers(candidates.bases, mismatch, largest) for each in tests]
+    observed = observed_by(found, candidates, limits)
     if not observed.values.size:
         return None
-    scales = np.ones(rows.shape[1])
     known = sum(each.size for each in candidates.places)
+    scales = np.ones(observed.rows.shape[1])
     scales[known] = mismatch
-    spreads = np.ones((len(NOT_LINEAR), rows.shape[1] - known))
-    spreads[:, 1 : 1 + 2 * FORCES] = NOT_LINEAR[:, None]
-    return candidates.curves(observed, scales, spreads)
-
-
-def _bare(harmonics: Harmonics, laser: int, bases: tuple[Basis, Basis], largest: Array) -> Numbers:
-    """Harmonics of the readings of laser 0 or 1 in a test of the bare frame; for `largest` see `ColumnHarmonics`."""
-    orders, columns = slice(harmonics.first, harmonics.first + harmonics.found.size), harmonics.columns
-    own = _parted(amplitudes(bases[laser](harmonics.readings))[orders])
-    n = len(own)
-    other, none = np.zeros((n, len(bases[1 - laser](np.zeros(1))))), np.zeros((n, 2))
-    bent = np.zeros((n, 2 * FORCES)) if columns is None else _parted(columns.scaled(largest))
-    # harmonics that the motion does not have are not changed by the scale
-    rows = np.concatenate((*((own, other) if laser == 0 else (other, own)), none[:, :1], bent, none), axis=1)
-    return Numbers(_parted(harmonics.found), np.tile(harmonics.uncertainty, 2), rows, none[:, :0])
-
-
-def _parted(numbers: Complex) -> Array:
-    """Real and then imaginary parts along the first axis."""
-    return np.concatenate((numbers.real, numbers.imag))
+    return candidates.curves(observed, scales, spreads(1, PROPERTIES + len(tests)))

@@ -60,7 +60,7 @@ def revealed(
         return None
     tests = [_signals(each) for each in (peaks.used, reference.used)]
     sample_rate = len(tests[0]) / len(peaks.used) * omega / tau
-    found = sensors.found_in(tests, frame, sample_rate, block, CAUTION)
+    found = sensors.found_in(tests, frame, sample_rate, block, CAUTION, checked=sensors.calibration is None)
     if found.curves is None:
         return None
     signals = ReadingCorrection(found)(tests[0])

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from bench.analysis import steady_curves
+from bench.analysis import bare_harmonics, steady_curves
 from bench.analysis.cycles import CycleAnalyser
 from bench.analysis.gain import TRANSIENT, SteadyPeak, gain, steady_peak
 from bench.analysis.linearity import LinearFrame
@@ -164,7 +164,7 @@ def test_harmonics_of_columns_that_are_not_linear_are_not_taken_for_errors(
     assert left < 0.5 * raw
     assert ratio < 1.3
     steady_curves.steady_curves.cache_clear()
-    monkeypatch.setattr(steady_curves, "NOT_LINEAR", np.array([1e-6]))
+    monkeypatch.setattr(bare_harmonics, "NOT_LINEAR", np.array([1e-6]))
     _, wrong, overlooked = scored(trials)
     assert wrong > 2.0 * left
     assert overlooked > 2.0

@@ -9,10 +9,10 @@ import pytest
 from numpy.lib.stride_tricks import sliding_window_view
 
 from bench.analysis.cycles import CycleAnalyser
-from bench.analysis.gain import SteadyPeak, gain, steady_peak
+from bench.analysis.gain import Gain, SteadyPeak, gain, steady_peak
 from bench.analysis.linearity import LinearFrame
 from bench.analysis.sensor_accuracy import SensorAccuracy
-from bench.analysis.sensor_uncertainty import SensorUncertainty
+from bench.analysis.sensor_uncertainty import LINEARITY, SensorUncertainty
 from bench.analysis.signals import DRIFT, LASER_1, LASER_2, SIGNALS
 from bench.analysis.unsteady_correction import Revealed, revealed
 from bench.analysis.unsteady_peaks import UnsteadyPeaks, unsteady_peaks
@@ -110,6 +110,26 @@ def test_the_noise_of_a_motion_that_is_nearly_a_sine_is_not_taken_for_errors() -
     rms = np.sqrt(np.mean(np.square(ratios), axis=0))
     assert (rms < 1.2).all()
     assert (rms > 0.05).all()
+
+
+@pytest.mark.parametrize("draws", [6, pytest.param(40, marks=pytest.mark.soak)])
+def test_harmonics_of_the_bare_frame_tell_more_of_the_errors(draws: int) -> None:
+    """The mean peak: noise and steps, which dominate the others, are averaged."""
+    errors, stated = list[list[float]](), list[list[float]]()
+    for number in range(draws):
+        test = beating(number)
+        checked = SENSORS.checked_by(steady_peak(test.bare.used, OMEGA, frame=GROUND).checks)
+        gains = list[Gain]()
+        for sensors in (SENSORS, checked):
+            found = revealed(test.peaks, test.bare, sensors, GROUND, OMEGA, BLOCK)
+            assert found is not None
+            gains.append(gain(found.peaks.mean, found.reference, found.sensors))
+        errors.append([each.alpha_2 / test.gains[1] - 1.0 for each in gains])
+        stated.append([each.budget.parts[LINEARITY] / each.alpha_2 for each in gains])
+    motion, both = np.sqrt(np.mean(np.square(stated), axis=0))
+    assert both < 0.6 * motion
+    left = np.sqrt(np.mean(np.square(errors), axis=0))
+    assert left[1] < min(1.5e-4, left[0])
 
 
 def test_where_nothing_is_gained_nothing_is_corrected() -> None:
