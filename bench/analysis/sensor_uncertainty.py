@@ -23,6 +23,7 @@ from bench.analysis.error_curve import CAUTION, Checks, Harmonics, widest
 from bench.analysis.laser_calibration import LaserCalibration
 from bench.analysis.laser_curves import laser_curves
 from bench.analysis.linearity import SMOOTH, Effect, LinearFrame, LinearityErrors, linearity_errors
+from bench.analysis.output_errors import late, steps
 from bench.analysis.peak_readings import PeakReadings, Shapes, beyond, shares_of
 from bench.analysis.sensor_accuracy import SensorAccuracy
 from bench.analysis.steady_curves import StoreyTest, steady_curves
@@ -160,8 +161,12 @@ class SensorUncertainty:
             errors = {LINEARITY: self.curves.errors(effects).draws(draws.normal(len(seen)))}
         else:
             errors = self._shaped(seen, draws, self.shapes(seen) if shapes is None else shapes)
-        errors[TIMING] = np.array([self.late(each, 1, draws) - self.late(each, 0, draws) for each in seen])
-        errors[STEPS] = np.array([self.steps(each, 0, draws) + self.steps(each, 1, draws) for each in seen])
+        errors[TIMING] = np.array(
+            [late(each, 1, self.accuracy, draws) - late(each, 0, self.accuracy, draws) for each in seen]
+        )
+        errors[STEPS] = np.array(
+            [steps(each, 0, self.accuracy, draws) + steps(each, 1, self.accuracy, draws) for each in seen]
+        )
         sides = np.array([[each.sign] for each in seen])
         return {name: sides * each for name, each in errors.items()}
 
@@ -275,29 +280,3 @@ class SensorUncertainty:
         ]
         limit = self.calibration.common_linearity
         return linearity_errors(effects, shares, limit, min(self.ranges), checks)
-
-    def late(self, seen: PeakReadings, laser: int, draws: Draws) -> Array:
-        """Errors [m] due to the delay of a laser with a free-running clock, uniform within one measuring period, shape
-        (n,).
-        """
-        return seen.speeds[laser] * self.accuracy.laser_timing * draws.uniform(-0.5, 0.5)
-
-    def steps(self, seen: PeakReadings, laser: int, draws: Draws) -> Array:
-        """Errors [m] due to a laser's resolution, shape (n,): the rounding errors of the fit, and one rounding error if
-        the zero was taken at rest. A fit around a single peak averages those of the steps that the laser passes; of a
-        mean of several peaks, those within one step are rounded alike.
-        """
-        step = self.accuracy.laser_resolution
-        if step == 0.0:
-            return np.zeros(draws.n)
-        if seen.fitted is not None:
-            variance = seen.fitted.variances(step)[laser]
-        else:
-            variance = step**2 / (12.0 * (1.0 + 2.0 * seen.swings[laser] / step))
-        if seen.several is not None:
-            readings, shares = seen.several
-            steps: Array = np.rint(readings[laser] / step)
-            alike = np.bincount((steps - steps.min()).astype(np.intp), weights=np.abs(shares))
-            variance *= float(alike @ alike)
-        zero = seen.sides * step * draws.uniform(-0.5, 0.5) if seen.at_rest else 0.0
-        return sqrt(variance) * draws.normal() + zero

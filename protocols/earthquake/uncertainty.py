@@ -18,6 +18,7 @@ from numpy.random import SeedSequence
 from numpy.typing import NDArray
 
 from bench.analysis.draws import Draws
+from bench.analysis.output_errors import late, steps
 from bench.analysis.peak_readings import PeakReadings
 from bench.analysis.sensor_uncertainty import SensorUncertainty
 from bench.analysis.uncertainty import COVERAGE, NOISE, Budget
@@ -251,7 +252,7 @@ def u1_errors(
     if grounded:
         errors += np.outer([peak.table for peak in peaks], sensors.table_scale * random.standard_normal(n))
     for row, each in zip(errors, seen, strict=True):
-        row += sensors.late(each, 0, draws) + sensors.steps(each, 0, draws)
+        row += late(each, 0, sensors.accuracy, draws) + steps(each, 0, sensors.accuracy, draws)
     errors /= np.array([[peak.peak.value] for peak in peaks])
     return errors + np.array([_noise(peak, random, n) for peak in peaks])
 
