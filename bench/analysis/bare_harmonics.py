@@ -29,13 +29,11 @@ Both = tuple[tuple[Harmonics, ...], tuple[Harmonics, ...]]
 UNIT = 1e-6
 """Standard deviation to which all numbers are scaled [m]."""
 
-NOT_LINEAR: Array = np.array([0.001, 0.01, 0.1])
-"""Possible standard deviations of the forces of columns that are not linear, relative to the linear one at the largest
-drift; friction has a tenth of them.
-"""
+NOT_LINEAR: Array = np.array([0.01, 0.1, 1.0])
+"""Possible standard deviations of the forces of columns that are not linear, relative to the largest expected ones."""
 
 LEAST_DRIFT = 1e-9
-"""Smallest drift to which they are relative [m]."""
+"""Smallest drift to which forces of columns are relative [m]."""
 
 PROPERTIES = 2
 """Number of further properties of the second storey: mass and damping relative to its stiffness."""

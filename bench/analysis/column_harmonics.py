@@ -19,8 +19,10 @@ from sim.specimen import Frame
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-SIZES: Array = np.array([1.0, 1.0, 0.1])
-"""Relative sizes of the forces of one storey's columns: in proportion to the drift's square and cube, and friction."""
+SIZES: Array = np.array([0.1, 0.1, 0.01])
+"""Largest expected forces of one storey's columns, relative to the linear one at the largest drift: in proportion to
+the drift's square and cube, and friction.
+"""
 
 FORCES = SIZES.size
 """Number of forces of one storey."""

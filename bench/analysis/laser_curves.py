@@ -51,7 +51,10 @@ def laser_curves(
     if not moved or 0.0 in limits:
         return None
     # also those of tests without equations, whose peaks are corrected as well
-    read = tuple(np.concatenate([each[:, column] for each in tests]) for column in (LASER_1, LASER_2))
+    read = [
+        np.concatenate([*(each[:, column] for each in tests), *(each.readings for each in found)])
+        for column, found in zip((LASER_1, LASER_2), checks, strict=True)
+    ]
     candidates = Candidates.over((read[0], read[1]), limits, ranges, caution)
     first, second = candidates.places
     found = [each.equations(candidates.bases) for each in moved]

@@ -26,7 +26,7 @@ from bench.analysis.linearity import SMOOTH, Effect, LinearFrame, LinearityError
 from bench.analysis.output_errors import late, steps
 from bench.analysis.peak_readings import PeakReadings, Shapes, beyond, shares_of
 from bench.analysis.sensor_accuracy import SensorAccuracy
-from bench.analysis.steady_curves import StoreyTest, steady_curves
+from bench.analysis.steady_curves import StoreyTest, bare_curves, steady_curves
 
 Array = NDArray[np.float64]
 
@@ -128,14 +128,16 @@ class SensorUncertainty:
         curves = laser_curves(tests, frame, sample_rate, limits, self.ranges, self.mismatch, block, caution, checks)
         return self if curves is None else replace(self, checks=(), corrected=True, curves=curves)
 
-    def found_by_harmonics(self, *tests: StoreyTest) -> "SensorUncertainty":
-        """A copy for steady peaks corrected for the errors that the checks, and the second storey in `tests`, reveal
+    def found_by_harmonics(self, test: StoreyTest | None = None) -> "SensorUncertainty":
+        """A copy for steady peaks corrected for the errors that the checks, and the second storey in a `test`, reveal
         (`bench.analysis.steady_curves`); the same object without checks, and for calibrated lasers.
         """
         if self.calibration is not None or not self.checks:
             return self
         first, second = (self.accuracy.laser_linearity * whole for whole in self.ranges)
-        curves = steady_curves(self._evaluated, tests, (first, second), self.ranges, self.mismatch)
+        told = (first, second), self.ranges, self.mismatch
+        checks = self._evaluated
+        curves = bare_curves(checks, *told) if test is None else steady_curves(checks, test, *told)
         return self if curves is None else replace(self, checks=(), corrected=True, curves=curves)
 
     @property

@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.analysis.bare_harmonics import (
-    PROPERTIES,
     Both,
     Numbers,
     bare_numbers,
@@ -38,15 +37,16 @@ Complex = NDArray[np.complex128]
 PLACES = 64
 """Number of points of a cycle at which the readings are evaluated."""
 
-KNOWN = 0.1
-"""Standard deviations of the second storey's mass and damping, relative to its stiffness."""
+LOSS = 0.1
+"""Standard deviation of the second storey's loss factor, c_2 omega / k_2. That of m_2 / k_2 is its assumed value."""
 
 
 @dataclass(frozen=True, eq=False)
 class StoreyTest:
     """Mean cycle of a steady test at `omega` [rad/s]: `readings` of both lasers over one period, shape (2, PLACES) [m];
-    complex amplitudes of both and of the table's acceleration in all `cycles`, shape (cycles, 3, H) [m, m/s2]; the bare
-    `frame`; resolution `step` [m] and unknown delay `late` [s] of the lasers.
+    complex amplitudes of both [m] and of the table's acceleration [m/s2] in all `cycles`, shape (cycles, 3, H); the
+    bare `frame`; resolution `step` [m] of the lasers, and the largest delay `late` [s], which is taken for a standard
+    deviation.
     """
 
     omega: float
@@ -91,14 +91,14 @@ class StoreyTest:
         relative, own = forces(self.readings[1] - self.readings[0])
         bent = np.zeros((highest, 2 * FORCES), dtype=np.complex128)
         bent[:, FORCES:] = -own * amplitudes(relative)[fitted]
-        changes = np.array([accelerated / self.omega**2, s / self.omega * (second - first)]).T
+        changes = np.array([storey.m2 / storey.k2 * accelerated, LOSS / self.omega * s * (second - first)]).T
         rows = np.concatenate(
             (
                 -lower[:, None] * amplitudes(bases[0](self.readings[0]))[fitted],
                 upper[:, None] * amplitudes(bases[1](self.readings[1]))[fitted],
                 mismatch * (upper * second)[:, None],
                 ColumnHarmonics(bent, np.array([largest[0], own])).scaled(largest),
-                KNOWN * changes,
+                changes,
             ),
             axis=1,
             dtype=np.complex128,
@@ -114,17 +114,16 @@ class StoreyTest:
         return Numbers(parted(found), np.tile(noise, 2), parted(rows), parted(late))
 
 
-@lru_cache(maxsize=4)
 def steady_curves(
     checks: Both,
-    tests: tuple[StoreyTest, ...],
+    test: StoreyTest | None,
     limits: tuple[float, float],
     ranges: tuple[float, float],
     mismatch: float,
 ) -> LaserCurves | None:
-    """Curves according to the `checks` of both lasers in tests of the bare frame, and to the motion of the second
-    storey in `tests`. None if the lasers have no errors, or if the harmonics tell nothing of them. The result is cached
-    for later calls with the same objects.
+    """Curves, over the whole ranges, according to the `checks` of both lasers in tests of the bare frame, and to the
+    motion of the second storey in a further `test`. None if the lasers have no errors, or if the harmonics tell nothing
+    of them.
 
     `limits` are the largest linearity errors and `ranges` the measuring ranges of the lasers [m]; `mismatch` is the
     standard uncertainty of the ratio of their scales.
@@ -132,17 +131,28 @@ def steady_curves(
     if not any(checks) or 0.0 in limits:
         return None
     first, second = (
-        np.concatenate([each.readings for each in found] + [each.readings[laser] for each in tests])
-        for laser, found in enumerate(checks)
+        np.concatenate([*(each.readings for each in found), *([] if test is None else [test.readings[laser]]), ends])
+        for laser, (found, ends) in enumerate(zip(checks, 0.5 * np.outer(ranges, (-1.0, 1.0)), strict=True))
     )
     candidates = Candidates.over((first, second), limits, ranges, CAUTION)
-    largest = np.max([largest_drifts(checks), *(np.array([0.0, each.drift]) for each in tests)], axis=0)
-    found = bare_numbers(checks, candidates.bases, largest)
-    found += [each.numbers(candidates.bases, mismatch, largest) for each in tests]
+    bases, largest = candidates.bases, largest_drifts(checks)
+    if test is not None:
+        largest = np.maximum(largest, (0.0, test.drift))
+    found = bare_numbers(checks, bases, largest)
+    if test is not None:
+        found.append(test.numbers(bases, mismatch, largest))
     observed = observed_by(found, candidates, limits)
     if not observed.values.size:
         return None
     known = sum(each.size for each in candidates.places)
     scales = np.ones(observed.rows.shape[1])
     scales[known] = mismatch
-    return candidates.curves(observed, scales, spreads(1, PROPERTIES + len(tests)))
+    return candidates.curves(observed, scales, spreads(1, scales.size - known - 1 - 2 * FORCES))
+
+
+@lru_cache(maxsize=4)
+def bare_curves(
+    checks: Both, limits: tuple[float, float], ranges: tuple[float, float], mismatch: float
+) -> LaserCurves | None:
+    """Curves according to tests of the bare frame alone, cached for later calls with the same objects."""
+    return steady_curves(checks, None, limits, ranges, mismatch)

@@ -2,9 +2,9 @@
 
 The motion of the second storey gives equations for the errors of both lasers (`bench.analysis.laser_curves`). Like that
 under a record, an unsteady motion passes many readings of both lasers in many combinations, and so does not need a
-calibration. The steady test of the bare frame adds equations, and is corrected as well. In the corrected motion the
-zero of the drift follows from momentum (`bench.analysis.drift_zero`), without the rounding errors of the readings at
-rest.
+calibration. The harmonics of the bare frame tell further errors of lasers that are not calibrated
+(`bench.analysis.bare_harmonics`); its steady test is corrected as well. In the corrected motion the zero of the drift
+follows from momentum (`bench.analysis.drift_zero`), without the rounding errors of the readings at rest.
 """
 
 from collections.abc import Sequence

@@ -9,7 +9,7 @@ from bench.analysis.free_motion import FreeMotion, Rate
 from bench.analysis.gain import Gain, SteadyPeak, gain, without_rounding
 from bench.analysis.linearity import LinearFrame
 from bench.analysis.sensor_uncertainty import SensorUncertainty
-from bench.analysis.steady_correction import corrected
+from bench.analysis.steady_correction import corrected, without_errors
 from bench.analysis.uncertainty import plus_minus
 from bench.analysis.unsteady_correction import revealed
 from bench.config.model import BenchConfiguration
@@ -46,7 +46,8 @@ class Conditions:
     `reference` is the bare frame's dwell at the same frequency, `known` the uncertainty of the `specimen`. Stability on
     the table is predicted with the model `shaker`, if there is one; `harmonics` is the number of harmonics of the
     table's motion that are controlled. Errors of the lasers are found according to the model of the bare `frame`, in an
-    unsteady motion with residuals that may be correlated for `block` seconds; not without a frame, or if it is zero.
+    unsteady motion with residuals that may be correlated for `block` seconds; neither without a frame, nor if `block`
+    is zero.
     """
 
     omega: float
@@ -178,7 +179,7 @@ def judge(settled: Settled, conditions: Conditions, starts: int, held: Held | No
     steady = settled.steadiness.steady
     name = (nearest_branch(branches, peak.drift, peak.u1) if steady else None) or _ROCKING
     status = (PointStatus.STEADY if name == _ROCKING else PointStatus.RESTING) if steady else PointStatus.MODULATED
-    comparison = (own if steady else conditions).comparison(name, branches.get(name), peak)
+    comparison = own.comparison(name, branches.get(name), peak)
     # an unsteady motion has the gain at the amplitude that occurred, which no branch describes
     measured, agrees = comparison.compare(peak) if steady else (own.gain(peak), None)
     on_table = None
@@ -187,7 +188,9 @@ def judge(settled: Settled, conditions: Conditions, starts: int, held: Held | No
     free = _free_fields(settled.motion, own)
     orbit: dict[str, Any] = {}
     if settled.orbit is not None:
-        gained, same = comparison.compare(settled.orbit)
+        curves = own.sensors.curves
+        mean = settled.orbit if curves is None else without_errors(settled.orbit, curves)
+        gained, same = comparison.compare(mean)
         orbit = {"alpha_2_orbit": gained.alpha_2, "alpha_2_orbit_uncertainty": gained.uncertainty, "orbit_agrees": same}
     remarks = (
         *_remarks(settled, conditions.reference, name, branches, agrees, on_table, free, orbit),
@@ -244,7 +247,8 @@ def _held_point(free: HarmonicPoint, held: Held, conditions: Conditions) -> Harm
     captured = f"captured after cycle {held.captured}" + (" without a model" if held.model_free else "")
     remarks.append(f"{captured}, control {100.0 * held.control:.2g} % of the amplitude (rms)")
     remarks += [*_amplitude_remark(held), *([DIFFERS] if agrees is False else [])]
-    remarks += [each for each in conditions.sensors.rough(measured.shapes) if each not in free.reason]
+    # the number in a remark may differ
+    remarks += [each for each in conditions.sensors.rough(measured.shapes) if each.split(" is ")[0] not in free.reason]
     return free.model_copy(
         update={
             "status": PointStatus.HELD,

@@ -71,6 +71,7 @@ class HarmonicPlan:
         self._amplitude = parameters.amplitude_factor * self._specimen.uplift_acceleration
         self._pace = Pace(parameters.omega, 1 + len(parameters.beta))
         self._bare: dict[float, Settled] = {}
+        self._running_sensors = configuration.sensors
         self._target_branches: dict[tuple[float, float], Branch | None] = {}
         self._points: list[HarmonicPoint] = []
         self._draws = shared_draws()
@@ -104,6 +105,8 @@ class HarmonicPlan:
             self._pace.finished(omega)
             duration = BARE_CHANGE
         yield RampOut()
+        # takes time, and is therefore evaluated while the table is at rest
+        self._running_sensors = self._sensors.found_by_harmonics() if self._parameters.laser_block else self._sensors
         return calibration
 
     def _spring(
@@ -293,10 +296,7 @@ class HarmonicPlan:
         gain: RunningGain | None = None
         predicted = float("nan")
         if specimen is not None and reference is not None:
-            sensors = self._sensors
-            if self._parameters.laser_block:
-                sensors = sensors.found_by_harmonics()
-            gain = RunningGain(reference.peak, sensors, self._draws)
+            gain = RunningGain(reference.peak, self._running_sensors, self._draws)
             branch = self._target_branch(specimen, omega)
             predicted = branch.alpha_2 if branch else predicted
         return RunningPoint(omega, specimen.label if specimen else None, gain, predicted, self._pace)

@@ -210,7 +210,9 @@ class HarmonicPoint(Parameters):
         "whether alpha_2 and its prediction differ by no more than their combined uncertainty (root sum of squares)",
     )
     drift_peak_m: float | None = quantity(None, "m", "peak drift of the coupled frame")
-    bare_drift_peak_m: float | None = quantity(None, "m", "peak drift of the bare frame")
+    bare_drift_peak_m: float | None = quantity(
+        None, "m", "peak drift of the bare frame, corrected for errors of the lasers as that of the point is"
+    )
     amplitude_m_s2: float | None = quantity(None, "m/s2", "achieved amplitude of the table, coupled frame")
     bare_amplitude_m_s2: float | None = quantity(None, "m/s2", "achieved amplitude of the table, bare frame")
     amplitude_error: float | None = quantity(None, "1", "relative error of the table's amplitude, coupled frame")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from bench.analysis import bare_harmonics, steady_curves
+from bench.analysis import bare_harmonics
 from bench.analysis.cycles import CycleAnalyser
 from bench.analysis.gain import TRANSIENT, SteadyPeak, gain, steady_peak
 from bench.analysis.linearity import LinearFrame
@@ -17,7 +17,7 @@ from bench.analysis.running_gain import RunningGain, shared_draws
 from bench.analysis.sensor_accuracy import SensorAccuracy
 from bench.analysis.sensor_uncertainty import LINEARITY, SensorUncertainty
 from bench.analysis.signals import ACCELERATION, DISPLACEMENT, DRIFT, LASER_1, LASER_2, SIGNALS, U1
-from bench.analysis.steady_correction import Corrected, corrected
+from bench.analysis.steady_correction import Corrected, corrected, without_errors
 from sim.linear import frame_matrices, steady_response
 from sim.specimen import Specimen
 from tests.bench.analysis.test_laser_curves import GROUND, TABLE, WHOLE, curve
@@ -121,10 +121,14 @@ class Trial:
         return found
 
 
-def trial(number: int, waves: tuple[float, float], frame: LinearFrame = GROUND, cubic: float = 0.0) -> Trial:
+def trial(
+    number: int, waves: tuple[float, float], frame: LinearFrame = GROUND, cubic: float = 0.0, *, part: float = 1.0
+) -> Trial:
+    """A pair of tests; the linear bare frame moves a `part` as far."""
     random = np.random.default_rng([number, 11])
     errors = [curve(*each) for each in zip(random.uniform(*waves, 2), random.uniform(0.0, tau, 2), strict=True)]
     bare, coupled = motions(cubic)
+    bare = Motion(*(part * each for each in (bare.table, bare.first, bare.second, bare.acceleration)))
     seen = [peak_of(each, errors, number, frame, bare=each is bare) for each in (bare, coupled)]
     return Trial(seen[0], seen[1], coupled.peak / bare.peak)
 
@@ -163,23 +167,27 @@ def test_harmonics_of_columns_that_are_not_linear_are_not_taken_for_errors(
     raw, left, ratio = scored(trials)
     assert left < 0.5 * raw
     assert ratio < 1.3
-    steady_curves.steady_curves.cache_clear()
     monkeypatch.setattr(bare_harmonics, "NOT_LINEAR", np.array([1e-6]))
     _, wrong, overlooked = scored(trials)
     assert wrong > 2.0 * left
     assert overlooked > 2.0
-    steady_curves.steady_curves.cache_clear()
 
 
-def test_the_test_with_the_block_tells_of_readings_that_it_alone_has() -> None:
-    """The bare frame moves a tenth as far: then it tells hardly anything."""
-    one = trial(1, (0.5, 2.0))
-    sensors = SENSORS.checked_by(one.bare.checks)
-    found = one.corrected()
-    alone = sensors.found_by_harmonics()
-    assert alone.curves is not None
-    parts = [gain(found.peak, found.reference, each).budget.parts[LINEARITY] for each in (found.sensors, alone)]
-    assert parts[0] < parts[1]
+def test_readings_beyond_those_of_the_bare_frame() -> None:
+    """The bare frame moves a twentieth as far: alone it tells little, and the test with the block more."""
+    trials = [trial(number, (3.0, 6.0), part=0.05) for number in range(12)]
+    parts, ratios = [], []
+    for one in trials:
+        alone = SENSORS.checked_by(one.bare.checks).found_by_harmonics()
+        assert alone.curves is not None
+        coupled, bare = (without_errors(each, alone.curves) for each in (one.coupled, one.bare))
+        both = one.corrected()
+        gains = [gain(coupled, bare, alone), gain(both.peak, both.reference, both.sensors)]
+        parts.append([each.budget.parts[LINEARITY] / each.alpha_2 for each in gains])
+        ratios.append([2.0 * (each.alpha_2 - one.true) / each.uncertainty for each in gains])
+    by_bare, by_both = np.sqrt(np.mean(np.square(parts), axis=0))
+    assert by_both < 0.95 * by_bare
+    assert (np.sqrt(np.mean(np.square(ratios), axis=0)) < 1.3).all()
 
 
 def test_a_running_gain_is_corrected_by_what_the_bare_frame_reveals() -> None:

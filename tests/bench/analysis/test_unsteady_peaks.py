@@ -12,7 +12,6 @@ from bench.analysis.draws import Draws
 from bench.analysis.gain import SteadyPeak
 from bench.analysis.output_errors import steps as steps_of
 from bench.analysis.sensor_accuracy import SensorAccuracy
-from bench.analysis.sensor_uncertainty import SensorUncertainty
 from bench.analysis.signals import DRIFT, LASER_1, LASER_2, U1
 from bench.analysis.unsteady_peaks import _selected, _smoothed, unsteady_peaks  # pyright: ignore[reportPrivateUsage]
 
@@ -102,11 +101,9 @@ def test_the_mean_of_many_peaks_has_the_mean_error_of_the_lasers(phase: float, o
     moved = mean(size * np.sin(70.0 * 1.5 * drift)).drift - exact.drift
     assert moved == pytest.approx(float(effect.weights @ (size * np.sin(70.0 * effect.places))), abs=0.03 * size)
     assert mean(0.0 * drift, size).drift - exact.drift == pytest.approx(exact.readings.sides * size, abs=0.03 * size)
-    sensors, draws = SensorUncertainty(SensorAccuracy(), (0.2, 0.2)), Draws(np.random.default_rng(1), 2000)
+    accuracy, draws = SensorAccuracy(), Draws(np.random.default_rng(1), 2000)
     moving = replace(exact.readings, at_rest=False)
-    steps = [
-        float(np.std(steps_of(each, 0, sensors.accuracy, draws))) for each in (moving, replace(moving, several=None))
-    ]
+    steps = [float(np.std(steps_of(each, 0, accuracy, draws))) for each in (moving, replace(moving, several=None))]
     assert 0.09 < steps[0] / steps[1] < 0.25
 
 
