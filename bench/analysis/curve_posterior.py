@@ -61,11 +61,15 @@ class LaserCurves:
         return found + scale * readings
 
     def bend(self, laser: int) -> float:
-        """Largest deviation of the expected errors of laser 0 or 1 from a straight line [m]."""
-        places = self.places[laser]
+        """Largest deviation of the expected errors of laser 0 or 1 from a straight line, less their expanded
+        uncertainty [m]; at least zero.
+        """
+        places, n = self.places[laser], self.places[0].size
         errors = self.expected(laser, places)
         straight = np.stack((places, np.ones(places.size)), axis=1)
-        return float(np.abs(errors - straight @ np.linalg.lstsq(straight, errors, rcond=None)[0]).max())
+        variances = np.diag(self.covariance)[:n] if laser == 0 else np.diag(self.covariance)[n:-1]
+        deviations = np.abs(errors - straight @ np.linalg.lstsq(straight, errors, rcond=None)[0])
+        return max(float((deviations - 2.0 * np.sqrt(np.maximum(variances, 0.0))).max()), 0.0)
 
     def errors(self, effects: Sequence[tuple[Effect | None, Effect | None]]) -> LinearityErrors:
         """Errors of quantities of corrected readings, each with the effects on it of the errors of both lasers, None
