@@ -20,7 +20,7 @@ from bench.analysis.signals import ACCELERATION, DISPLACEMENT, DRIFT, LASER_1, L
 from bench.analysis.steady_correction import Corrected, corrected, without_errors
 from sim.linear import frame_matrices, steady_response
 from sim.specimen import Specimen
-from tests.bench.analysis.test_laser_curves import GROUND, TABLE, WHOLE, curve
+from tests.bench.analysis.test_laser_curves import GROUND, TABLE, WHOLE, Motion, curve
 from tests.bench.calibrated import calibration
 
 Array = np.ndarray
@@ -32,24 +32,13 @@ RINGING = 120
 """Cycles in which the free vibration decays."""
 
 
-@dataclass(frozen=True)
-class Motion:
-    """Table and, relative to it, both storeys in the last cycles: displacements [m]; acceleration of the table."""
-
-    table: Array
-    first: Array
-    second: Array
-    acceleration: Array
-
-    @property
-    def peak(self) -> float:
-        """Peak of the mean cycle, relative to the mean over the cycle [m]."""
-        drift = self.second - self.first
-        harmonics = np.fft.rfft(drift[: whole(CYCLES)])[::CYCLES] / whole(CYCLES)
-        harmonics[0] = 0.0
-        length = 8 * harmonics.size
-        padded = np.pad(harmonics, (0, length // 2 + 1 - harmonics.size))
-        return float(length * np.abs(np.fft.irfft(padded, length)).max())
+def peak(motion: Motion) -> float:
+    """Peak of the mean cycle, relative to the mean over the cycle [m]."""
+    harmonics = np.fft.rfft(motion.drift[: whole(CYCLES)])[::CYCLES] / whole(CYCLES)
+    harmonics[0] = 0.0
+    length = 8 * harmonics.size
+    padded = np.pad(harmonics, (0, length // 2 + 1 - harmonics.size))
+    return float(length * np.abs(np.fft.irfft(padded, length)).max())
 
 
 def whole(cycles: int) -> int:
@@ -90,7 +79,9 @@ def motions(cubic: float = 0.0) -> tuple[Motion, Motion]:
     last = slice(whole(RINGING), None)
     given = np.imag(np.exp(1j * np.outer(time, orders)) @ blocked)
     x, a = table[last], LEVEL * np.sin(OMEGA * time[last])
-    return Motion(x, found.y[0, last], found.y[1, last], a), Motion(x, given[last], found.y[4, last], a)
+    storeys = found.y[:2, last], (given[last], found.y[4, last])
+    bare, coupled = (Motion(x, x + first, x + second, a) for first, second in storeys)
+    return bare, coupled
 
 
 def peak_of(
@@ -99,12 +90,13 @@ def peak_of(
     random = np.random.default_rng([number, bare])
     seen = np.zeros((motion.table.size, len(SIGNALS) + 1))
     seen[:, DISPLACEMENT], seen[:, ACCELERATION] = motion.table, motion.acceleration
-    base = motion.table if frame.grounded else 0.0
+    base = 0.0 if frame.grounded else motion.table
     for column, storey, error in zip((LASER_1, LASER_2), (motion.first, motion.second), errors, strict=True):
-        x = base + storey
+        x = storey - base
         read = x + error(x) + NOISE * random.standard_normal(x.size)
         seen[:, column] = STEP * np.round(read / STEP)
-    seen[:, DRIFT], seen[:, U1] = seen[:, LASER_2] - seen[:, LASER_1], seen[:, LASER_1] - base
+    seen[:, DRIFT] = seen[:, LASER_2] - seen[:, LASER_1]
+    seen[:, U1] = seen[:, LASER_1] + base - motion.table
     cycles = CycleAnalyser(OMEGA, RATE, 0).push(seen)[:CYCLES]
     return steady_peak(cycles, OMEGA, frame=frame if bare else None)
 
@@ -130,7 +122,7 @@ def trial(
     bare, coupled = motions(cubic)
     bare = Motion(*(part * each for each in (bare.table, bare.first, bare.second, bare.acceleration)))
     seen = [peak_of(each, errors, number, frame, bare=each is bare) for each in (bare, coupled)]
-    return Trial(seen[0], seen[1], coupled.peak / bare.peak)
+    return Trial(seen[0], seen[1], peak(coupled) / peak(bare))
 
 
 def scored(trials: list[Trial], frame: LinearFrame = GROUND) -> tuple[float, float, float]:
