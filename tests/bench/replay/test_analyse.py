@@ -160,6 +160,7 @@ def test_accuracies_and_specimen_are_those_that_were_given(
     stiffer = 1.1 * BENCH.specimen.frame.k2
     point = _analysed(campaign, capsys, *(f"analysis.{name}=0" for name in exact), f"specimen.frame.k2={stiffer}")
     # lasers without linearity errors are not corrected
+    assert point["alpha_2"] != old["alpha_2"]
     assert point["alpha_2"] == pytest.approx(old["alpha_2"], abs=old["alpha_2_uncertainty"])
     left = {name: part for name, part in json.loads(str(point["uncertainty_parts"])).items() if part > 0.0}
     assert set(left) == {"scatter of the cycles", "remaining transient"}
