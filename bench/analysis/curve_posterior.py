@@ -8,6 +8,7 @@ observations are linear functions, so that mean and covariance of the curves fol
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,9 +53,8 @@ class LaserCurves:
 
     def expected(self, laser: int, readings: Array) -> Array:
         """Expected errors [m] of laser 0 or 1 at `readings` [m], minus that at rest; same shape, NaN stays NaN."""
-        places, n = self.places[laser], self.places[0].size
-        values, scale = (self.mean[:n], 0.0) if laser == 0 else (self.mean[n:-1], float(self.mean[-1]))
-        curve = _spline(places, values)
+        places, curve = self.places[laser], self._curves[laser]
+        scale = 0.0 if laser == 0 else float(self.mean[-1])
         found = np.full(readings.shape, np.nan)
         known = np.isfinite(readings)
         found[known] = curve(np.clip(readings[known], places[0], places[-1])) - curve(np.zeros(1))
@@ -78,11 +78,20 @@ class LaserCurves:
         rows = np.array([np.concatenate([self._row(k, each) for k, each in enumerate(pair)]) for pair in effects])
         return LinearityErrors(rows @ self.covariance @ rows.T, 0.0)
 
+    @cached_property
+    def _bases(self) -> tuple[Basis, Basis]:
+        return _basis(self.places[0]), _basis(self.places[1])
+
+    @cached_property
+    def _curves(self) -> tuple[Basis, Basis]:
+        n = self.places[0].size
+        return _spline(self.places[0], self.mean[:n]), _spline(self.places[1], self.mean[n:-1])
+
     def _row(self, laser: int, effect: Effect | None) -> Array:
         places = self.places[laser]
         if effect is None:
             return np.zeros(places.size + laser)
-        row = _basis(places)(effect.places) @ effect.weights
+        row = self._bases[laser](effect.places) @ effect.weights
         return row if laser == 0 else np.append(row, effect.weights @ effect.places)
 
 

@@ -128,16 +128,22 @@ class SensorUncertainty:
         curves = laser_curves(tests, frame, sample_rate, limits, self.ranges, self.mismatch, block, caution, checks)
         return self if curves is None else replace(self, checks=(), corrected=True, curves=curves)
 
-    def found_by_harmonics(self, test: StoreyTest | None = None) -> "SensorUncertainty":
-        """A copy for steady peaks corrected for the errors that the checks, and the second storey in a `test`, reveal
-        (`bench.analysis.steady_curves`); the same object without checks, and for calibrated lasers.
+    def found_by_harmonics(
+        self, test: StoreyTest | None = None, seen: Sequence[PeakReadings] = ()
+    ) -> "SensorUncertainty":
+        """A copy for steady peaks corrected for the errors that the checks reveal (`bench.analysis.steady_curves`), for
+        any reading; or those that the second storey in a `test` reveals as well, for its readings, those of the checks
+        and the ones `seen`. The same object without checks, and for calibrated lasers.
         """
         if self.calibration is not None or not self.checks:
             return self
         first, second = (self.accuracy.laser_linearity * whole for whole in self.ranges)
-        told = (first, second), self.ranges, self.mismatch
-        checks = self._evaluated
-        curves = bare_curves(checks, *told) if test is None else steady_curves(checks, test, *told)
+        limits, checks = (first, second), self._evaluated
+        if test is None:
+            curves = bare_curves(checks, limits, self.ranges, self.mismatch)
+        else:
+            one, other = (np.concatenate([[0.0], *(each.effect(laser).places for each in seen)]) for laser in (0, 1))
+            curves = steady_curves(checks, test, limits, self.ranges, self.mismatch, (one, other))
         return self if curves is None else replace(self, checks=(), corrected=True, curves=curves)
 
     @property

@@ -33,7 +33,8 @@ def corrected(
     """
     if not peak.used or peak.readings.weights is None:
         return None
-    found = sensors.found_by_harmonics(StoreyTest.of(peak.used, omega, frame, sensors.accuracy))
+    test = StoreyTest.of(peak.used, omega, frame, sensors.accuracy)
+    found = sensors.found_by_harmonics(test, (peak.readings, reference.readings))
     if found.curves is None:
         return None
     return Corrected(without_errors(peak, found.curves), without_errors(reference, found.curves), found)

@@ -120,10 +120,11 @@ def steady_curves(
     limits: tuple[float, float],
     ranges: tuple[float, float],
     mismatch: float,
+    further: tuple[Array, Array],
 ) -> LaserCurves | None:
-    """Curves, over the whole ranges, according to the `checks` of both lasers in tests of the bare frame, and to the
-    motion of the second storey in a further `test`. None if the lasers have no errors, or if the harmonics tell nothing
-    of them.
+    """Curves according to the `checks` of both lasers in tests of the bare frame, and to the motion of the second
+    storey in another `test`, over their readings and `further` ones. None if the lasers have no errors, or if the
+    harmonics tell nothing of them.
 
     `limits` are the largest linearity errors and `ranges` the measuring ranges of the lasers [m]; `mismatch` is the
     standard uncertainty of the ratio of their scales.
@@ -131,8 +132,8 @@ def steady_curves(
     if not any(checks) or 0.0 in limits:
         return None
     first, second = (
-        np.concatenate([*(each.readings for each in found), *([] if test is None else [test.readings[laser]]), ends])
-        for laser, (found, ends) in enumerate(zip(checks, 0.5 * np.outer(ranges, (-1.0, 1.0)), strict=True))
+        np.concatenate([*(each.readings for each in found), *([] if test is None else [test.readings[laser]]), others])
+        for laser, (found, others) in enumerate(zip(checks, further, strict=True))
     )
     candidates = Candidates.over((first, second), limits, ranges, CAUTION)
     bases, largest = candidates.bases, largest_drifts(checks)
@@ -154,5 +155,8 @@ def steady_curves(
 def bare_curves(
     checks: Both, limits: tuple[float, float], ranges: tuple[float, float], mismatch: float
 ) -> LaserCurves | None:
-    """Curves according to tests of the bare frame alone, cached for later calls with the same objects."""
-    return steady_curves(checks, None, limits, ranges, mismatch)
+    """Curves over the whole ranges according to tests of the bare frame alone, cached for later calls with the same
+    objects.
+    """
+    first, second = 0.5 * np.outer(ranges, (-1.0, 1.0))
+    return steady_curves(checks, None, limits, ranges, mismatch, (first, second))

@@ -119,7 +119,7 @@ def test_the_noise_of_a_motion_that_is_nearly_a_sine_is_not_taken_for_errors() -
 
 
 @pytest.mark.parametrize("further", [None, 0.045])
-@pytest.mark.parametrize("draws", [6, pytest.param(40, marks=pytest.mark.soak)])
+@pytest.mark.parametrize("draws", [3, pytest.param(40, marks=pytest.mark.soak)])
 def test_harmonics_of_the_bare_frame_tell_more_of_the_errors(draws: int, further: float | None) -> None:
     """The mean peak: noise and steps, which dominate the others, are averaged."""
     errors, stated = list[list[float]](), list[list[float]]()
