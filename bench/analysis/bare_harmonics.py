@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from bench.analysis.column_harmonics import FORCES, amplitudes
 from bench.analysis.curve_observations import Observations, observations
 from bench.analysis.curve_posterior import Basis, Candidates
-from bench.analysis.error_curve import LEAST, Harmonics, block_diagonal
+from bench.analysis.error_curve import LEAST, Harmonics
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -35,22 +35,22 @@ NOT_LINEAR: Array = np.array([0.01, 0.1, 1.0])
 LEAST_DRIFT = 1e-9
 """Smallest drift to which forces of columns are relative [m]."""
 
-PROPERTIES = 2
-"""Number of further properties of the second storey: mass and damping relative to its stiffness."""
+PROPERTIES = 3
+"""Number of further unknowns of a test with a block: mass and damping of the second storey relative to its stiffness,
+and a delay between the lasers.
+"""
 
 
 @dataclass(frozen=True, eq=False)
 class Numbers:
     """Measured numbers as linear functions of the unknowns: `values`, shape (n,) [m], with the standard deviations
     `noise`, shape (n,) [m]; `rows`, shape (n, unknowns), for the curves of laser 1 and laser 2, the scale of laser 2
-    relative to that of laser 1, the columns of both storeys, and PROPERTIES of the second one; and `late`, shape (n, 0)
-    or (n, 1), for an unknown of this test alone.
+    relative to that of laser 1, the columns of both storeys, and the PROPERTIES of a test with a block.
     """
 
     values: Array
     noise: Array
     rows: Array
-    late: Array
 
 
 def bare_numbers(checks: Both, bases: tuple[Basis, Basis], largest: Array) -> list[Numbers]:
@@ -65,7 +65,7 @@ def bare_numbers(checks: Both, bases: tuple[Basis, Basis], largest: Array) -> li
             bent = np.zeros((n, 2 * FORCES)) if each.columns is None else parted(each.columns.scaled(largest))
             # harmonics that the motion does not have are not changed by the scale
             rows = np.concatenate((*((own, other) if laser == 0 else (other, own)), none[:, :1], bent, none), axis=1)
-            found.append(Numbers(parted(each.found), np.tile(each.uncertainty, 2), rows, none[:, :0]))
+            found.append(Numbers(parted(each.found), np.tile(each.uncertainty, 2), rows))
     return found
 
 
@@ -80,8 +80,7 @@ def observed_by(found: Sequence[Numbers], candidates: Candidates, limits: tuple[
     linearity errors `limits` [m].
     """
     noise = np.hypot(np.concatenate([each.noise for each in found]), LEAST * min(limits)) / UNIT
-    rows = np.concatenate([each.rows for each in found])
-    rows = np.concatenate((rows, block_diagonal([each.late for each in found])), axis=1) / noise[:, None]
+    rows = np.concatenate([each.rows for each in found]) / noise[:, None]
     values = np.concatenate([each.values for each in found]) / noise
     starts = np.cumsum([0, *(each.values.size for each in found[:-1])])
     return observations(rows, values, 0, starts, candidates.flexible, least=UNIT)

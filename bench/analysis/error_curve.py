@@ -61,7 +61,7 @@ class Harmonics:
     shape (m,), complex [m], are the amplitudes c_k, from the order `first` on, in signal = Re(sum of c_k exp(-i k
     phase)); `uncertainty`, shape (m,) [m], is the standard uncertainty of their real and imaginary parts. `first` is 2
     unless the motion is known, so that the fundamental tells the error of the scale. `columns` are the harmonics of a
-    frame whose columns are not linear, None if there are no columns.
+    frame whose columns are not linear, None if these are not considered.
     """
 
     readings: Array

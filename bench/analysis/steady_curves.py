@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.analysis.bare_harmonics import (
+    PROPERTIES,
     Both,
     Numbers,
     bare_numbers,
@@ -99,6 +100,7 @@ class StoreyTest:
                 mismatch * (upper * second)[:, None],
                 ColumnHarmonics(bent, np.array([largest[0], own])).scaled(largest),
                 changes,
+                (self.late * upper * s * second)[:, None],
             ),
             axis=1,
             dtype=np.complex128,
@@ -110,8 +112,7 @@ class StoreyTest:
             np.abs(part) * rounding(float(swing), self.step) for part, swing in zip((lower, upper), swings, strict=True)
         ]
         noise = np.sqrt(scatter**2 + steps[0] ** 2 + steps[1] ** 2)
-        late = (self.late * upper * s * second)[:, None]
-        return Numbers(parted(found), np.tile(noise, 2), parted(rows), parted(late))
+        return Numbers(parted(found), np.tile(noise, 2), parted(rows))
 
 
 def steady_curves(
@@ -148,7 +149,7 @@ def steady_curves(
     known = sum(each.size for each in candidates.places)
     scales = np.ones(observed.rows.shape[1])
     scales[known] = mismatch
-    return candidates.curves(observed, scales, spreads(1, scales.size - known - 1 - 2 * FORCES))
+    return candidates.curves(observed, scales, spreads(1, PROPERTIES))
 
 
 @lru_cache(maxsize=4)

@@ -100,7 +100,11 @@ class Conditions:
         found = corrected(peak, self.reference.peak, self.sensors, self.frame, self.omega)
         if found is None:
             return peak, self
-        return found.peak, replace(self, reference=replace(self.reference, peak=found.reference), sensors=found.sensors)
+        return found.peak, self.found(found.reference, found.sensors)
+
+    def found(self, reference: SteadyPeak, sensors: SensorUncertainty) -> "Conditions":
+        """Conditions with a corrected peak of the `reference`, and the `sensors` with the errors found."""
+        return replace(self, reference=replace(self.reference, peak=reference), sensors=sensors)
 
     def branches(self, peak: SteadyPeak) -> dict[str, Branch]:
         """Predicted branches at the measured amplitudes of the table."""
@@ -227,7 +231,7 @@ def _corrected(settled: Settled, conditions: Conditions) -> tuple[Settled, Condi
     found = revealed(motion.peaks, reference.peak, conditions.sensors, frame, conditions.omega, conditions.block)
     if found is None:
         return settled, conditions
-    own = replace(conditions, reference=replace(reference, peak=found.reference), sensors=found.sensors)
+    own = conditions.found(found.reference, found.sensors)
     return replace(settled, peak=found.peaks.greatest, motion=replace(motion, peaks=found.peaks)), own
 
 
