@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from bench.analysis.cycles import Cycle
 from bench.analysis.gain import SteadyPeak, steady_peak
+from bench.analysis.sensor_accuracy import SensorAccuracy
 from bench.analysis.signals import DRIFT, LASER_1, LASER_2, U1
 from bench.analysis.unsteady_peaks import UnsteadyPeaks, uninterrupted, unsteady_peaks
 from sim.attractor import LONGEST_PERIOD, period_of
@@ -70,14 +71,14 @@ class FreeMotion:
     rate: Rate | None
 
 
-def free_motion(cycles: Sequence[Cycle], omega: float) -> FreeMotion:
+def free_motion(cycles: Sequence[Cycle], omega: float, accuracy: SensorAccuracy) -> FreeMotion:
     """Description of cycles at a constant drive of `omega` [rad/s]; peaks and period are those of the last `CYCLES`.
 
     Where cycles are missing, period and rate are those of the longest stretch without a missing cycle.
     """
     last = cycles[-CYCLES:]
     return FreeMotion(
-        peaks=unsteady_peaks(last, omega),
+        peaks=unsteady_peaks(last, omega, accuracy),
         repeats=period_of(np.array([cycle.extreme[[U1, DRIFT]] for cycle in _longest(last)])),
         rate=rate_of(cycles),
     )

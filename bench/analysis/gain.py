@@ -19,6 +19,7 @@ from bench.analysis.rounding import FittedPeak
 from bench.analysis.rounding_correction import MODEL, rounding
 from bench.analysis.sensor_accuracy import SensorAccuracy as SensorAccuracy
 from bench.analysis.sensor_uncertainty import SensorUncertainty
+from bench.analysis.series_mean import standard_error
 from bench.analysis.signals import ACCELERATION, DRIFT, LASER_1, LASER_2, U1
 from bench.analysis.uncertainty import COVERAGE as COVERAGE
 from bench.analysis.uncertainty import NOISE, Budget, combined_freedom
@@ -103,15 +104,15 @@ def steady_peak(
     Over a period of a steady motion the second storey gains no momentum, so the force k2 times drift, which alone
     drives it, has zero mean for any motion of the block. The mean is therefore a better zero of the sensors than a
     reading at rest before the test, in which the rounding error of each laser would enlarge the peak on one side. The
-    scatter is that of the cycles at the peak, corrected for the correlation of neighbouring cycles, M_eff = M (1 - r1)
-    / (1 + r1). A remaining transient is estimated from `cycles` and those `before` them at the same drive; `residual`,
-    the relative bound of a further systematic effect, is treated as a rectangular distribution. The harmonics of the
-    readings of a linear `frame` check the linearity of the lasers.
+    scatter is that of the cycles at the peak (`bench.analysis.series_mean`). A remaining transient is estimated from
+    `cycles` and those `before` them at the same drive; `residual`, the relative bound of a further systematic effect,
+    is treated as a rectangular distribution. The harmonics of the readings of a linear `frame` check the linearity of
+    the lasers.
     """
     waves = mean_waves(cycles, {DRIFT: PEAK_HARMONICS})
     every = mean_waves([*before, *cycles], {DRIFT: PEAK_HARMONICS}) if before else waves
     drift = float(waves.peaks[DRIFT])
-    scatter, freedom = _standard_error(waves.there[:, DRIFT])
+    scatter, freedom = standard_error(waves.there[:, DRIFT])
     transient = hypot(remaining_transient(every.there[:, DRIFT], len(cycles)), residual * drift / sqrt(3.0))
     return SteadyPeak(
         drift=drift,
@@ -134,7 +135,7 @@ def without_rounding(peak: SteadyPeak, omega: float, step: float) -> SteadyPeak:
     laser whose errors can be estimated. This takes up to a second: not while the table is driven.
     """
     readings, fitted = peak.readings, peak.readings.fitted
-    if fitted is None or not peak.used:
+    if not isinstance(fitted, FittedPeak) or not peak.used:
         return peak
     errors, remaining = [0.0, 0.0], list(fitted.variances(step))
     for laser, column in enumerate((LASER_1, LASER_2)):
@@ -199,20 +200,6 @@ def _checks(cycles: Sequence[Cycle], waves: Waves, omega: float, frame: LinearFr
         noise = np.hypot(scatter, FRAME_SHARE * np.abs(real))
         found.append(Harmonics(readings[::step], error, noise, columns=columns))
     return found[0], found[1]
-
-
-def _standard_error(series: NDArray[np.float64]) -> tuple[float, float]:
-    """Standard uncertainty of the mean of a correlated series, and its degrees of freedom."""
-    if series.size < 3:
-        return float(np.ptp(series)), 1.0
-    deviation = series - series.mean()
-    variance = float(deviation @ deviation) / (series.size - 1)
-    if variance == 0.0:
-        return 0.0, series.size - 1.0
-    r1 = float(deviation[1:] @ deviation[:-1]) / ((series.size - 1) * variance)
-    r1 = min(max(r1, 0.0), 0.95)
-    effective = max(series.size * (1.0 - r1) / (1.0 + r1), 1.0)
-    return sqrt(variance / effective), max(effective - 1.0, 1.0)
 
 
 def gain(

@@ -21,8 +21,7 @@ def late(seen: PeakReadings, laser: int, accuracy: SensorAccuracy, draws: Draws)
 
 def steps(seen: PeakReadings, laser: int, accuracy: SensorAccuracy, draws: Draws) -> Array:
     """Errors [m] due to the resolution of laser 0 or 1, shape (n,): the rounding errors of the fit, and one rounding
-    error if the zero was taken at rest. A fit around a single peak averages those of the steps that the laser passes;
-    of a mean of several peaks, those within one step are rounded alike.
+    error if the zero was taken at rest. Without the fit, errors are averaged over the steps that the laser passes.
     """
     step = accuracy.laser_resolution
     if step == 0.0:
@@ -31,10 +30,5 @@ def steps(seen: PeakReadings, laser: int, accuracy: SensorAccuracy, draws: Draws
         variance = seen.fitted.variances(step)[laser]
     else:
         variance = step**2 / (12.0 * (1.0 + 2.0 * seen.swings[laser] / step))
-    if seen.several is not None:
-        readings, shares = seen.several
-        passed: Array = np.rint(readings[laser] / step)
-        alike = np.bincount((passed - passed.min()).astype(np.intp), weights=np.abs(shares))
-        variance *= float(alike @ alike)
     zero = seen.sides * step * draws.uniform(-0.5, 0.5) if seen.at_rest else 0.0
     return sqrt(variance) * draws.normal() + zero

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.analysis.linearity import Effect, LinearityErrors
-from bench.analysis.rounding import FittedPeak
+from bench.analysis.rounding import FittedPeak, SmoothedPeaks
 
 Array = NDArray[np.float64]
 
@@ -23,7 +23,7 @@ class PeakReadings:
     at_rest : whether the zero was taken at rest, where rounding errors do not average out.
     weights : derivatives of the peak of a fitted cycle with respect to the readings in `zero`, shape (n,); None if the
         peak is the reading at the peak minus the mean of `zero`.
-    fitted : the fitted cycles of which it is the peak; None for a fit to the readings around a single peak.
+    fitted : the fitted cycles of which it is the peak, or the smoothed samples around the peaks; None for a transient.
     several : of a mean of n peaks, the readings of both lasers at each [m], shape (2, n), and the derivatives of the
         mean with respect to the drift there, shape (n,): shares of the peaks, negative where the drift is. `lasers`,
         `speeds` and `swings` are then means, turned to the positive side. None for a single peak.
@@ -37,7 +37,7 @@ class PeakReadings:
     swings: tuple[float, float]
     at_rest: bool
     weights: Array | None = None
-    fitted: FittedPeak | None = None
+    fitted: FittedPeak | SmoothedPeaks | None = None
     several: tuple[Array, Array] | None = None
 
     @property

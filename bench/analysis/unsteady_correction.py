@@ -68,7 +68,7 @@ def revealed(
     if zero is None:
         return None
     signals[:, DRIFT] -= zero.drift
-    corrected = _relative_to(zero, unsteady_peaks(_with(peaks.used, signals), omega))
+    corrected = _relative_to(zero, unsteady_peaks(_with(peaks.used, signals), omega, sensors.accuracy))
     moved = without_errors(reference, found.curves)
     if gain(corrected.greatest, moved, found).uncertainty >= gain(peaks.greatest, reference, sensors).uncertainty:
         return None

@@ -9,17 +9,18 @@ peak, by 10 % if the amplitude changes by half within a few cycles, because the 
 the cycle. The uncertainties are those of the motion that occurred; they do not include how much other cycles differ.
 Where cycles are missing, no period spans the gap.
 
-Of N equal peaks with noise, the largest is too large by up to sqrt(2 ln N) standard deviations of the noise, the
-smallest too small. Peaks are taken for equal if they differ by less than `NEAR` standard deviations; the bound counts
-as a rectangular distribution. The larger of the peaks on both sides within a period is too large for the same reason
-(Clark, C. E., 1961, Operations Research 9:145), and so is the mean over the periods. So is the largest sample of one
-peak, less the more the peak is curved.
+The largest of several peaks with errors is too large on average, the smallest too small. The errors that differ between
+peaks are noise, the steps of the lasers and the delays due to their clocks. What such errors would change on average if
+they were added again is an estimate of what they did change, by which both peaks are corrected (bootstrap estimate of
+bias: Efron, B., and R. J. Tibshirani, 1993, An Introduction to the Bootstrap, section 10.2). The larger of the peaks on
+both sides within a period is too large for the same reason (Clark, C. E., 1961, Operations Research 9:145), and so is
+the mean over the periods. So is the largest sample of one peak, less the more the peak is curved.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import erfc, hypot, log, sqrt, tau
+from math import erfc, hypot, sqrt, tau
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -28,20 +29,30 @@ from numpy.typing import NDArray
 from bench.analysis.cycles import SHARE, Cycle, mean_amplitude, mean_waves, parabola
 from bench.analysis.gain import SteadyPeak
 from bench.analysis.peak_readings import PeakReadings
+from bench.analysis.rounding import SmoothedPeaks
+from bench.analysis.sensor_accuracy import SensorAccuracy
 from bench.analysis.signals import ACCELERATION, DRIFT, U1
 from sim.attractor import largest_within
 
 Array = NDArray[np.float64]
 
-NEAR = 4.0
-"""Largest difference of peaks that are taken for equal, in standard deviations of the noise."""
-
 POSITIONS = 8
 """Positions of the period, for each period, at which the peaks of the mean are described."""
 
+NEAR = 6.0
+"""Largest difference of peaks of which either may be the largest, in standard deviations of their errors."""
+
+DRAWS, SEED = 2000, 1
+"""Number of Monte Carlo draws of the errors of such peaks, and the seed."""
+
 AGAIN = 1.0 / (sqrt(2.0) - 1.0)
-"""Excess of the largest of equal values with noise, relative to the further excess if noise of the same size is added
-again: equal values with both scatter by sqrt(2) of it.
+"""Excess of the largest of equal values with errors, relative to the further excess if errors of the same size are
+added again: equal values with both scatter by sqrt(2) of them.
+"""
+
+LEFT = (AGAIN - 1.0) / sqrt(3.0)
+"""Standard uncertainty of a peak that is corrected for the excess of its selection, relative to the correction: at most
+the excess of equal values is left.
 """
 
 
@@ -57,40 +68,94 @@ class UnsteadyPeaks:
     used: tuple[Cycle, ...] = ()
 
 
-def unsteady_peaks(cycles: Sequence[Cycle], omega: float) -> UnsteadyPeaks:
+def unsteady_peaks(cycles: Sequence[Cycle], omega: float, accuracy: SensorAccuracy) -> UnsteadyPeaks:
     """Peaks of consecutive cycles at `omega` [rad/s], relative to the storeys at rest."""
     windows = [_Windows.of(each) for each in uninterrupted(cycles)]
     least = min(windows, key=lambda each: each.largest.min())
     greatest = max(windows, key=lambda each: each.largest.max())
     noise, excess = max(each.noise for each in windows), max(each.excess for each in windows)
-    tops = np.concatenate([each.largest[:: each.length] for each in windows])
-    sides = np.concatenate([each.sides for each in windows])
     u1 = max(float(cycle.extreme[U1]) for cycle in cycles)
     amplitude = mean_amplitude(cycles, ACCELERATION)
     harmonics = float(mean_waves(cycles).harmonics[ACCELERATION])
 
     def of(drift: float, readings: PeakReadings, error: float) -> SteadyPeak:
-        return SteadyPeak(drift, 0.0, 0.0, u1, amplitude, harmonics, readings, len(cycles), noise=error)
+        seen = replace(readings, drift=drift)
+        return SteadyPeak(drift, 0.0, 0.0, u1, amplitude, harmonics, seen, len(cycles), noise=error)
 
-    mean, smallest = float(np.concatenate([each.largest for each in windows]).mean()), float(least.largest.min())
-    # the vertex of a parabola, not the largest sample
-    largest = max(float(cycle.extreme[DRIFT]) for cycle in cycles)
-    seen = np.concatenate([each.seen(each.tops[0]) for each in windows])
+    at_least = least.seen(least.top_within(int(least.largest.argmin()))).mean(np.ones(1), omega)
+    at_greatest = greatest.seen(greatest.top_within(int(greatest.largest.argmax()))).mean(np.ones(1), omega)
+    seen = _Seen.joined([each.seen(each.tops[0]) for each in windows])
     shares = np.concatenate([each.tops[1] for each in windows]) / sum(each.tops[1].sum() for each in windows)
+    smallest = float(least.largest.min())
+    # the vertex of a parabola, not the largest sample
+    vertex = max(float(cycle.extreme[DRIFT]) for cycle in cycles)
+    errors = seen.covariance(noise, accuracy, omega)
+    tops = np.abs(seen.drift)
+    sides = np.concatenate([each.sides for each in windows])
+    one = sqrt(float(shares @ np.diag(errors)))
+    too_small, too_large = _selection(-tops, errors), _selection(tops, errors)
     return UnsteadyPeaks(
-        least=of(
-            smallest,
-            _readings(smallest, least.seen_within(int(least.largest.argmin())), omega),
-            hypot(_selected(-tops, noise), excess),
+        least=of(smallest + too_small, at_least, hypot(noise, LEFT * too_small, excess)),
+        mean=of(
+            float(np.concatenate([each.largest for each in windows]).mean()),
+            seen.mean(shares, omega),
+            hypot(noise / sqrt(len(cycles)), _larger_side(sides, one), excess),
         ),
-        mean=of(mean, _mean(mean, seen, shares, omega), hypot(_averaged(sides, noise, len(tops)), excess)),
-        greatest=of(
-            largest,
-            _readings(largest, greatest.seen_within(int(greatest.largest.argmax())), omega),
-            _selected(tops, noise),
-        ),
+        greatest=of(vertex - too_large, at_greatest, hypot(noise, LEFT * too_large)),
         used=tuple(cycles),
     )
+
+
+@dataclass(frozen=True, eq=False)
+class _Seen:
+    """Smoothed `drift` [m] at n peaks, shape (n,), and of both lasers the readings there [m], shape (n, 2), their
+    changes per cycle / (2 pi), shape (n, 2), and the readings `around` them, shape (n, 2, m), with the `weights` of the
+    parabola, shape (m,).
+    """
+
+    drift: Array
+    readings: Array
+    rates: Array
+    around: Array
+    weights: Array
+
+    @classmethod
+    def joined(cls, parts: "Sequence[_Seen]") -> "_Seen":
+        """The peaks of all `parts`."""
+        drift, readings, rates, around = (
+            np.concatenate([getattr(each, name) for each in parts]) for name in ("drift", "readings", "rates", "around")
+        )
+        return cls(drift, readings, rates, around, parts[0].weights)
+
+    def covariance(self, noise: float, accuracy: SensorAccuracy, omega: float) -> Array:
+        """Covariance [m2], shape (n, n), of the errors of the peaks due to `noise` [m] and to the delays and the steps
+        of the lasers.
+        """
+        late = omega * accuracy.laser_timing / sqrt(12.0) * np.linalg.norm(self.rates, axis=1)
+        found = np.diag(noise**2 + late**2)
+        if accuracy.laser_resolution:
+            each = SmoothedPeaks(self.around.transpose(1, 0, 2), self.weights, np.sign(self.drift))
+            found += each.covariance(accuracy.laser_resolution)
+        return found
+
+    def mean(self, shares: Array, omega: float) -> PeakReadings:
+        """Readings at the mean of the peaks, with their `shares`, shape (n,), of a motion at `omega` [rad/s]."""
+        turned = np.where(self.drift < 0.0, -shares, shares)
+        lasers, speeds, swings = (
+            tuple(map(float, each))
+            for each in (turned @ self.readings, omega * turned @ self.rates, shares @ np.ptp(self.around, axis=2))
+        )
+        return PeakReadings(
+            drift=float(shares @ np.abs(self.drift)),
+            sign=1.0,
+            lasers=(lasers[0], lasers[1]),
+            speeds=(speeds[0], speeds[1]),
+            zero=np.zeros((2, 1)),
+            swings=(swings[0], swings[1]),
+            at_rest=True,
+            fitted=SmoothedPeaks(self.around.transpose(1, 0, 2), self.weights, turned),
+            several=(self.readings.T, turned),
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,20 +213,18 @@ class _Windows:
         bound = np.maximum(curvature, 0.5 * self.slope**2 / self.noise if self.noise else 1.0)
         return float(np.average(0.5 * self.slope**2 / bound, weights=number))
 
-    def seen_within(self, window: int) -> Array:
-        """What is `seen` at the sample with the largest drift at one position of the period, shape (3, 2)."""
-        return self.seen(window + np.abs(self.smooth[window : window + self.length, :1]).argmax(axis=0))[0]
+    def top_within(self, window: int) -> NDArray[np.intp]:
+        """Sample with the largest drift at one position of the period, shape (1,)."""
+        return window + np.abs(self.smooth[window : window + self.length, :1]).argmax(axis=0)
 
-    def seen(self, tops: NDArray[np.intp]) -> Array:
-        """Readings of both lasers [m] at the samples `tops`, shape (n,), their changes per cycle / (2 pi), and their
-        ranges around them, shape (n, 3, 2).
-        """
-        step = _half(self.length)
-        first, last = np.maximum(tops - step, 0), np.minimum(tops + step, len(self.smooth) - 1)
-        lasers = self.smooth[:, 1:]
-        rates = (lasers[last] - lasers[first]) * (self.length / (tau * (last - first)))[:, None]
-        ranges = [np.ptp(lasers[begin : end + 1], axis=0) for begin, end in zip(first, last, strict=True)]
-        return np.stack((lasers[tops], rates, np.array(ranges)), axis=1)
+    def seen(self, tops: NDArray[np.intp]) -> _Seen:
+        """What is seen at the samples `tops`, shape (n,)."""
+        step, last = _half(self.length), len(self.smooth) - 1
+        first, end = np.maximum(tops - step, 0), np.minimum(tops + step, last)
+        drift, lasers = self.smooth[tops, 0], self.smooth[:, 1:]
+        rates = (lasers[end] - lasers[first]) * (self.length / (tau * (end - first)))[:, None]
+        rows = np.clip(tops, step, last - step)[:, None] + np.arange(-step, step + 1)
+        return _Seen(drift, lasers[tops], rates, lasers[rows].transpose(0, 2, 1), parabola(2 * step + 1)[0])
 
 
 def _half(length: int) -> int:
@@ -201,40 +264,26 @@ def uninterrupted(cycles: Sequence[Cycle]) -> list[list[Cycle]]:
     return found
 
 
-def _selected(values: Array, noise: float) -> float:
-    """Standard uncertainty of the largest of `values`, shape (n,), each with independent `noise`."""
-    near = np.count_nonzero(values >= values.max() - NEAR * noise)
-    return noise * sqrt(1.0 + 2.0 * log(near) / 3.0)
-
-
-def _averaged(sides: Array, noise: float, periods: int) -> float:
-    """Rms error of the mean, over so many `periods`, of the larger of the peaks on both `sides`, shape (n, 2), each
-    with independent `noise`.
+def _selection(values: Array, covariance: Array) -> float:
+    """Expected increase of the largest of `values`, shape (n,), if errors of this covariance were added again, which is
+    an estimate of the bias due to those that they contain.
     """
-    if noise == 0.0:
+    near = values >= values.max() - NEAR * sqrt(covariance.diagonal().max())
+    if np.count_nonzero(near) == 1:
         return 0.0
-    distance = np.abs(np.diff(sides, axis=1)).ravel() / (sqrt(2.0) * noise)
+    # with errors that several values have in common, the matrix may be singular
+    variances, directions = np.linalg.eigh(covariance[np.ix_(near, near)])
+    normal = np.random.default_rng(SEED).standard_normal((DRAWS, variances.size))
+    errors = normal @ (directions * np.sqrt(np.maximum(variances, 0.0))).T
+    return max(float((values[near] + errors).max(axis=1).mean() - values.max()), 0.0)
+
+
+def _larger_side(sides: Array, spread: float) -> float:
+    """Rms of what the selection of the larger of the peaks on both `sides`, shape (n, 2), with independent errors of
+    the standard deviation `spread`, adds to their mean.
+    """
+    if spread == 0.0:
+        return 0.0
+    distance = np.abs(np.diff(sides, axis=1)).ravel() / (sqrt(2.0) * spread)
     beyond = 0.5 * np.array([erfc(each / sqrt(2.0)) for each in distance.tolist()])
-    excess = sqrt(2.0) * float(np.mean(np.exp(-0.5 * distance**2) / sqrt(tau) - distance * beyond))
-    return noise * hypot(1.0 / sqrt(periods), AGAIN * excess)
-
-
-def _mean(drift: float, seen: Array, shares: Array, omega: float) -> PeakReadings:
-    """Readings at the mean of peaks, from what is `seen` at each, shape (n, 3, 2), and their `shares`, shape (n,)."""
-    side = np.where(seen[:, 0, 1] < seen[:, 0, 0], -1.0, 1.0)
-    turned = seen * np.stack((side, side, np.ones(side.size)), axis=1)[:, :, None]
-    return replace(_readings(drift, np.tensordot(shares, turned, 1), omega), several=(seen[:, 0].T, side * shares))
-
-
-def _readings(drift: float, seen: Array, omega: float) -> PeakReadings:
-    (first, second), (rate_1, rate_2), (range_1, range_2) = seen.tolist()
-    return PeakReadings(
-        drift=drift,
-        sign=-1.0 if second < first else 1.0,
-        lasers=(first, second),
-        speeds=(omega * rate_1, omega * rate_2),
-        zero=np.zeros((2, 1)),
-        # one rounding error, averaged over the steps that a laser passes around the peak
-        swings=(range_1, range_2),
-        at_rest=True,
-    )
+    return AGAIN * sqrt(2.0) * spread * float(np.mean(np.exp(-0.5 * distance**2) / sqrt(tau) - distance * beyond))

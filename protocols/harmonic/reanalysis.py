@@ -8,7 +8,7 @@ import numpy as np
 
 from bench.analysis.cycles import Cycle, CycleAnalyser
 from bench.analysis.free_motion import CYCLES, KEPT, Rate, free_motion, orbit_peak
-from bench.analysis.gain import steady_peak
+from bench.analysis.gain import SteadyPeak, steady_peak
 from bench.analysis.signals import SIGNALS
 from bench.analysis.steady import SteadyDetector
 from bench.analysis.unsteady_peaks import unsteady_peaks
@@ -194,7 +194,7 @@ class HarmonicFollower:
         omega, used = series.sine.omega, series.recent[-min(self._cycles, certain) :]
         table = SineResponse.of(used, series.sine, series.turn or 1.0 + 0.0j)
         return Held(
-            peak=unsteady_peaks(used, omega).greatest if self._settings.peak == "largest" else steady_peak(used, omega),
+            peak=self._largest(used, omega) if self._settings.peak == "largest" else steady_peak(used, omega),
             amplitude_error=table.amplitude_error,
             phase_error=table.phase_error,
             control=point.control_share or 0.0,
@@ -206,7 +206,8 @@ class HarmonicFollower:
 
     def _settled(self, series: _Series) -> Settled:
         omega = series.sine.omega
-        jitter = omega * self._configuration.analysis.laser_timing
+        accuracy = self._configuration.analysis
+        jitter = omega * accuracy.laser_timing
         detector = SteadyDetector(self._tolerance, JUDGED, LASERS, jitter)
         for cycle in series.recent:
             detector.push(cycle)
@@ -219,11 +220,11 @@ class HarmonicFollower:
         mean = how == "mean" or (how == "judged" and steadiness.steady)
         if not steadiness.steady and self._settings.measured_cycles is None:
             used = constant[-CYCLES:]
-        motion = None if steadiness.steady else free_motion(constant[-KEPT:], omega)
+        motion = None if steadiness.steady else free_motion(constant[-KEPT:], omega, accuracy)
         frame = linear_frame(self._configuration) if series.beta is None else None
         before = preceding(constant, used) if steadiness.steady else ()
         return Settled(
-            steady_peak(used, omega, before=before, frame=frame) if mean else unsteady_peaks(used, omega).greatest,
+            steady_peak(used, omega, before=before, frame=frame) if mean else self._largest(used, omega),
             steadiness,
             series.waited,
             table.amplitude_error,
@@ -232,6 +233,9 @@ class HarmonicFollower:
             motion,
             None if motion is None else orbit_peak(constant, motion, omega),
         )
+
+    def _largest(self, cycles: Sequence[Cycle], omega: float) -> SteadyPeak:
+        return unsteady_peaks(cycles, omega, self._configuration.analysis).greatest
 
 
 def _rate(point: HarmonicPoint) -> Rate | None:

@@ -167,7 +167,7 @@ def settle_and_measure(
                     again = waiting is not None and not over and measurements < MOST and waiting(peak)
                 else:
                     kept = list(constant)
-                    motion = free_motion(kept, sine.omega)
+                    motion = free_motion(kept, sine.omega, accuracy)
                     peak = motion.peaks.greatest
                     orbit = orbit_peak(kept, motion, sine.omega)
                 state = TableState(turn, drive, complex(table.achieved[0] / table.played[0]))

@@ -73,7 +73,9 @@ def beating(
         signals[:, DRIFT] = signals[:, LASER_2] - signals[:, LASER_1]
         found.append((signals, second - first))
     cycles, others = (CycleAnalyser(OMEGA, RATE, 0).push(signals) for signals, _ in found)
-    return Test(unsteady_peaks(cycles, OMEGA), steady_peak(others[-24:], OMEGA), found[0][1], found[1][1])
+    return Test(
+        unsteady_peaks(cycles, OMEGA, SENSORS.accuracy), steady_peak(others[-24:], OMEGA), found[0][1], found[1][1]
+    )
 
 
 @pytest.mark.parametrize("draws", [8, pytest.param(40, marks=pytest.mark.soak)])
