@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.analysis.selection import RIVALS, largest_of
 from bench.analysis.signals import bridged
 from bench.analysis.transient_base import noise_density
 from sim.errors import InvalidInput
@@ -65,10 +66,6 @@ _STANDS_OUT, _SMOOTHED = 4.0, 0.5
 """Power, relative to the noise, above which a frequency counts as signal, and width [Hz] over which the power is
 averaged first.
 """
-_RIVALS = 6.0
-"""Number of standard deviations below the largest maximum within which another maximum may be the true largest."""
-_RAISED = 0.5
-_DRAWS, _SEED, _HALVINGS = 2000, 20, 30
 _MISSING = 0.25
 """Largest fraction of missing samples in a window."""
 _STRONG = 0.5
@@ -113,14 +110,14 @@ def transient_peak(signal: Array, rest: Array, sample_rate: float) -> TransientP
     half = _half_width(float(np.abs(whole).max()), sigma, omega / sample_rate, min(signal.size, rest.size))
     smooth = _smoothed(whole, half)
     spread = sigma * sqrt(_VARIANCE / (2.0 * half))
-    if not np.abs(smooth).max() > _RIVALS * max(spread, 1e-300):
+    if not np.abs(smooth).max() > RIVALS * max(spread, 1e-300):
         raise InvalidInput(
             "transient", float(np.abs(smooth).max()), "it does not exceed the noise; repeat with a larger motion"
         )
-    found = [_maximum(whole, known, int(place), half, sigma) for place in _candidates(smooth, _RIVALS * spread)]
+    found = [_maximum(whole, known, int(place), half, sigma) for place in _candidates(smooth, RIVALS * spread)]
     greatest = max(found, key=lambda each: each.value)
     _check_gaps(whole, known, half, greatest.value)
-    value, uncertainty = _greatest(np.array([[each.value, each.uncertainty] for each in found]))
+    value, uncertainty = largest_of(np.array([[each.value, each.uncertainty] for each in found]))
     return TransientPeak(
         value=value,
         uncertainty=uncertainty,
@@ -224,26 +221,3 @@ def _maximum(signal: Array, known: NDArray[np.bool_], place: int, half: int, sig
         # noise shifts the position of the extremum, so that its magnitude is overestimated on average
         value -= 0.5 * sigma**2 * float(along @ along) / abs(float(bend(top)))
     return _Maximum(value, sigma * float(np.linalg.norm(at)), place + top * half, sign)
-
-
-def _greatest(maxima: Array) -> tuple[float, float]:
-    """The largest of several noisy maxima and its standard uncertainty.
-
-    `maxima` has the rows (value, uncertainty), shape (n, 2). The largest of several noisy values is too large on
-    average. The estimate mu is the value for which the expected maximum equals the observed one, with no true value
-    above mu. The other values are raised by half a standard deviation, because near mu they appear too low once the
-    largest has been selected. The bias, 2 standard deviations for 24 equal maxima, is thus reduced to less than one
-    half, also for fewer maxima. The uncertainty is that of one maximum; rivals do not reduce it.
-    """
-    values, spreads = maxima.T
-    top, widest = float(values.max()), float(spreads.max())
-    if values.size == 1:
-        return top, widest
-    noise = spreads * np.random.default_rng(_SEED).standard_normal((_DRAWS, values.size))
-    low, high = top - _RIVALS * widest, top
-    mu = top
-    for _ in range(_HALVINGS):
-        mu = 0.5 * (low + high)
-        seen = float((np.minimum(values + _RAISED * spreads, mu) + noise).max(axis=1).mean())
-        low, high = (low, mu) if seen > top else (mu, high)
-    return mu, widest

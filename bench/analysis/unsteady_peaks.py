@@ -9,18 +9,15 @@ peak, by 10 % if the amplitude changes by half within a few cycles, because the 
 the cycle. The uncertainties are those of the motion that occurred; they do not include how much other cycles differ.
 Where cycles are missing, no period spans the gap.
 
-The largest of several peaks with errors is too large on average, the smallest too small. The errors that differ between
-peaks are noise, the steps of the lasers and the delays due to their clocks. What such errors would change on average if
-they were added again is an estimate of what they did change, by which both peaks are corrected (bootstrap estimate of
-bias: Efron, B., and R. J. Tibshirani, 1993, An Introduction to the Bootstrap, section 10.2). The larger of the peaks on
-both sides within a period is too large for the same reason (Clark, C. E., 1961, Operations Research 9:145), and so is
-the mean over the periods. So is the largest sample of one peak, less the more the peak is curved.
+The largest of several peaks with errors is too large on average, the smallest too small; both are corrected for it
+(`bench.analysis.selection`). The errors that differ between peaks are noise, the steps of the lasers and the delays due
+to their clocks. So is the largest sample of one peak, less the more the peak is curved.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import erfc, hypot, sqrt, tau
+from math import hypot, sqrt, tau
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -30,6 +27,7 @@ from bench.analysis.cycles import SHARE, Cycle, mean_amplitude, mean_waves, para
 from bench.analysis.gain import SteadyPeak
 from bench.analysis.peak_readings import PeakReadings
 from bench.analysis.rounding import SmoothedPeaks
+from bench.analysis.selection import LEFT, larger_side, selection_bias
 from bench.analysis.sensor_accuracy import SensorAccuracy
 from bench.analysis.signals import ACCELERATION, DRIFT, U1
 from sim.attractor import largest_within
@@ -38,22 +36,6 @@ Array = NDArray[np.float64]
 
 POSITIONS = 8
 """Positions of the period, for each period, at which the peaks of the mean are described."""
-
-NEAR = 6.0
-"""Largest difference of peaks of which either may be the largest, in standard deviations of their errors."""
-
-DRAWS, SEED = 2000, 1
-"""Number of Monte Carlo draws of the errors of such peaks, and the seed."""
-
-AGAIN = 1.0 / (sqrt(2.0) - 1.0)
-"""Excess of the largest of equal values with errors, relative to the further excess if errors of the same size are
-added again: equal values with both scatter by sqrt(2) of them.
-"""
-
-LEFT = (AGAIN - 1.0) / sqrt(3.0)
-"""Standard uncertainty of a peak that is corrected for the excess of its selection, relative to the correction: at most
-the excess of equal values is left.
-"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,13 +75,13 @@ def unsteady_peaks(cycles: Sequence[Cycle], omega: float, accuracy: SensorAccura
     tops = np.abs(seen.drift)
     sides = np.concatenate([each.sides for each in windows])
     one = sqrt(float(shares @ np.diag(errors)))
-    too_small, too_large = _selection(-tops, errors), _selection(tops, errors)
+    too_small, too_large = selection_bias(-tops, errors), selection_bias(tops, errors)
     return UnsteadyPeaks(
         least=of(smallest + too_small, at_least, hypot(noise, LEFT * too_small, excess)),
         mean=of(
             float(np.concatenate([each.largest for each in windows]).mean()),
             seen.mean(shares, omega),
-            hypot(noise / sqrt(len(cycles)), _larger_side(sides, one), excess),
+            hypot(noise / sqrt(len(cycles)), larger_side(sides, one), excess),
         ),
         greatest=of(vertex - too_large, at_greatest, hypot(noise, LEFT * too_large)),
         used=tuple(cycles),
@@ -262,28 +244,3 @@ def uninterrupted(cycles: Sequence[Cycle]) -> list[list[Cycle]]:
         else:
             found.append([cycle])
     return found
-
-
-def _selection(values: Array, covariance: Array) -> float:
-    """Expected increase of the largest of `values`, shape (n,), if errors of this covariance were added again, which is
-    an estimate of the bias due to those that they contain.
-    """
-    near = values >= values.max() - NEAR * sqrt(covariance.diagonal().max())
-    if np.count_nonzero(near) == 1:
-        return 0.0
-    # with errors that several values have in common, the matrix may be singular
-    variances, directions = np.linalg.eigh(covariance[np.ix_(near, near)])
-    normal = np.random.default_rng(SEED).standard_normal((DRAWS, variances.size))
-    errors = normal @ (directions * np.sqrt(np.maximum(variances, 0.0))).T
-    return max(float((values[near] + errors).max(axis=1).mean() - values.max()), 0.0)
-
-
-def _larger_side(sides: Array, spread: float) -> float:
-    """Rms of what the selection of the larger of the peaks on both `sides`, shape (n, 2), with independent errors of
-    the standard deviation `spread`, adds to their mean.
-    """
-    if spread == 0.0:
-        return 0.0
-    distance = np.abs(np.diff(sides, axis=1)).ravel() / (sqrt(2.0) * spread)
-    beyond = 0.5 * np.array([erfc(each / sqrt(2.0)) for each in distance.tolist()])
-    return AGAIN * sqrt(2.0) * spread * float(np.mean(np.exp(-0.5 * distance**2) / sqrt(tau) - distance * beyond))

@@ -45,8 +45,9 @@ from protocols.common.sine.settling import (
     settle_and_measure,
 )
 from protocols.harmonic.approach import far, stable_above, with_pause
+from protocols.harmonic.conditions import Conditions, predicted_fields
 from protocols.harmonic.free_prediction import with_free_prediction
-from protocols.harmonic.judgement import Conditions, judge, predicted_fields
+from protocols.harmonic.judgement import judge
 from protocols.harmonic.protocol import HarmonicParameters, HarmonicPoint, PointStatus
 from protocols.harmonic.running import RunningPoint
 from sim.gain import Branch, predict_gain

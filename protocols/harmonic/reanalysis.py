@@ -31,8 +31,9 @@ from protocols.common.sine.settling import (
     linear_frame,
     preceding,
 )
+from protocols.harmonic.conditions import Conditions, predicted_fields
 from protocols.harmonic.free_prediction import with_free_prediction
-from protocols.harmonic.judgement import Conditions, judge, predicted_fields
+from protocols.harmonic.judgement import judge
 from protocols.harmonic.protocol import HarmonicParameters, HarmonicPoint, HarmonicSettings, PointStatus
 from sim.gain import predict_gain
 

@@ -29,7 +29,8 @@ from bench.analysis.sensor_uncertainty import SensorUncertainty
 from bench.analysis.steady import Steadiness, SteadyDetector
 from bench.config.model import BenchConfiguration
 from protocols.common.sine.settling import INTERVAL, JUDGED, LASERS, SHORTEST, TRANSIENT, Settled, checked
-from protocols.harmonic.judgement import Conditions, judge
+from protocols.harmonic.conditions import Conditions
+from protocols.harmonic.judgement import judge
 from protocols.harmonic.protocol import HarmonicParameters, HarmonicPoint, PointStatus
 from protocols.laser_calibration.reference import ReferenceCurve
 from sim.gain import predict_gain

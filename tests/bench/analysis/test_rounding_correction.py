@@ -14,7 +14,7 @@ from bench.analysis.sensor_uncertainty import SensorUncertainty
 from bench.analysis.signals import DRIFT, LASER_1, SIGNALS
 from bench.analysis.steady import Steadiness
 from protocols.common.sine.settling import Settled
-from protocols.harmonic.judgement import Conditions
+from protocols.harmonic.conditions import Conditions
 from sim.filter_unit import FilterUnit
 from sim.knowledge import SpecimenKnowledge
 from sim.sensors import Converter, Laser

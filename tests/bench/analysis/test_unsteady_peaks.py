@@ -14,12 +14,7 @@ from bench.analysis.gain import SteadyPeak
 from bench.analysis.output_errors import steps as steps_of
 from bench.analysis.sensor_accuracy import SensorAccuracy
 from bench.analysis.signals import DRIFT, LASER_1, LASER_2, U1
-from bench.analysis.unsteady_peaks import (
-    LEFT,
-    _selection,  # pyright: ignore[reportPrivateUsage]
-    _smoothed,  # pyright: ignore[reportPrivateUsage]
-    unsteady_peaks,
-)
+from bench.analysis.unsteady_peaks import _smoothed, unsteady_peaks  # pyright: ignore[reportPrivateUsage]
 
 Array = NDArray[np.float64]
 
@@ -79,36 +74,6 @@ def test_the_noise_of_the_smallest_and_the_largest_of_many_peaks_is_stated(offse
     assert (rms < 1.4).all()
     # of two sides, the larger one is too large: the smallest of several is less too small than it is corrected for
     assert (rms > (0.3, 0.4, 0.6)).all()
-
-
-@pytest.mark.parametrize(
-    ("distances", "within"),
-    [
-        ([0.0, 30.0], 1.1),
-        ([0.0, 1.0, 2.0, 30.0], 1.1),
-        (np.arange(40) * 0.5, 1.1),
-        ([0.0, 0.0, 0.5, 30.0, 40.0], 1.2),
-        # of equal values, at most the bias that equal values leave
-        ([0.0] * 9, 1.3),
-    ],
-)
-def test_the_largest_of_several_values_is_corrected_for_its_selection(distances: list[float], within: float) -> None:
-    random, true = np.random.default_rng(1), -2.0 * np.array(distances)
-    seen = true + 2.0 * random.standard_normal((600, true.size))
-    added = np.array([_selection(each, np.diag(np.full(true.size, 4.0))) for each in seen])
-    largest = seen.max(axis=1)
-    stated = np.sqrt(4.0 + (LEFT * added) ** 2)
-    assert np.mean(np.abs(largest - added) < 2.0 * stated) > 0.88
-    assert 0.8 < np.sqrt(np.mean(((largest - added) / stated) ** 2)) < within
-    # two thirds of what selection adds to equal values are left
-    assert -0.2 < np.mean(largest - added) < 0.7 * np.mean(largest) + 0.2
-
-
-def test_errors_that_values_have_in_common_are_not_due_to_selection() -> None:
-    values, common = np.array([0.0, -0.1, -0.2]), np.full((3, 3), 4.0)
-    assert _selection(values, common) == pytest.approx(0.0, abs=0.1)
-    assert _selection(values, common + np.eye(3)) == pytest.approx(_selection(values, np.eye(3)), abs=0.15)
-    assert _selection(values, np.zeros((3, 3))) == 0.0
 
 
 def rounded_motion(seed: int, changes: float) -> tuple[Array, Array]:

@@ -13,7 +13,8 @@ from bench.analysis.sensor_uncertainty import SensorUncertainty
 from bench.analysis.steady import Steadiness
 from bench.analysis.unsteady_peaks import UnsteadyPeaks
 from protocols.common.sine.settling import Settled
-from protocols.harmonic.judgement import Conditions, judge
+from protocols.harmonic.conditions import Conditions
+from protocols.harmonic.judgement import judge
 from protocols.harmonic.protocol import HarmonicPoint, PointStatus
 from sim.gain import predict_gain
 from sim.knowledge import SpecimenKnowledge
