@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.analysis.linearity import Effect, LinearityErrors
-from bench.analysis.rounding import FittedPeak, SmoothedPeaks
+from bench.analysis.rounding import FittedPeak
+from bench.analysis.smoothed_peaks import SmoothedPeaks
 
 Array = NDArray[np.float64]
 
@@ -24,9 +25,10 @@ class PeakReadings:
     weights : derivatives of the peak of a fitted cycle with respect to the readings in `zero`, shape (n,); None if the
         peak is the reading at the peak minus the mean of `zero`.
     fitted : the fitted cycles of which it is the peak, or the smoothed samples around the peaks; None for a transient.
-    several : of a mean of n peaks, the readings of both lasers at each [m], shape (2, n), and the derivatives of the
-        mean with respect to the drift there, shape (n,): shares of the peaks, negative where the drift is. `lasers`,
-        `speeds` and `swings` are then means, turned to the positive side. None for a single peak.
+    several : of the mean of n peaks of single cycles, or of one, the readings of both lasers at each [m], shape (2, n),
+        and the derivatives of the mean with respect to the drift there, shape (n,): shares of the peaks, negative where
+        the drift is. `sign` is then 1, and `lasers`, `speeds` and `swings` are means, turned to the positive side. None
+        for the peak of a mean cycle or of a transient.
     """
 
     drift: float

@@ -18,7 +18,7 @@ steps on.
 """
 
 from dataclasses import dataclass, field
-from math import pi, sqrt
+from math import pi
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,9 +27,6 @@ Array = NDArray[np.float64]
 
 TERMS = 4
 """Number of terms of the sawtooth; with many steps per cycle, the others have 2 % of the variance."""
-
-FEW_TERMS = 10
-"""Number of terms with few steps around a peak, where the others have 6 % of the variance."""
 
 PLACES, SIZES = 2048, 4
 """Number of phases at which the readings are evaluated, shared between the cycles, which are sampled at different
@@ -80,39 +77,6 @@ class FittedPeak:
                 power *= turns
             self._variances[step] = float(found[0]), float(found[1])
         return self._variances[step]
-
-
-@dataclass(frozen=True, eq=False)
-class SmoothedPeaks:
-    """Mean of peaks of single cycles, each the value of a polynomial fitted to the samples around it.
-
-    `readings` [m], shape (2, peaks, m), are those of laser 1 and 2 around each peak, smoothed; `weights`, shape (m,),
-    are those of the samples in the value, and `shares`, shape (peaks,), are those of the values in the mean.
-    """
-
-    readings: Array
-    weights: Array
-    shares: Array
-
-    def variances(self, step: float) -> tuple[float, float]:
-        """Variances [m2] of the mean due to rounding of the readings of laser 1 and of laser 2 to multiples of `step`
-        [m].
-        """
-        first, second = np.sum(np.abs(self._errors(step).sum(axis=2)) ** 2, axis=0).tolist()
-        return first, second
-
-    def covariance(self, step: float) -> Array:
-        """Covariance [m2], shape (peaks, peaks), of the shares of all values of the difference between the lasers."""
-        errors = self._errors(step).reshape(-1, self.shares.size)
-        return np.asarray((errors.conj().T @ errors).real)
-
-    def _errors(self, step: float) -> NDArray[np.complex128]:
-        """Complex rms amplitudes [m] of the terms of the sawtooth in each share, shape (FEW_TERMS, 2, peaks)."""
-        turns = np.exp(2j * pi / step * self.readings)
-        terms = np.arange(1, FEW_TERMS + 1)
-        powers = np.cumprod(np.broadcast_to(turns, (FEW_TERMS, *turns.shape)), axis=0)
-        sizes = (step / (sqrt(2.0) * pi)) * self.shares / terms[:, None, None]
-        return np.asarray((powers @ self.weights) * sizes, dtype=np.complex128)
 
 
 def _values(harmonics: NDArray[np.complex128], n: int) -> Array:

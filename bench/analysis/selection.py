@@ -21,8 +21,8 @@ Array = NDArray[np.float64]
 RIVALS = 6.0
 """Number of standard deviations below the largest value within which another one may be the true largest."""
 
-DRAWS, SEED = 2000, 1
-"""Number of Monte Carlo draws of errors that are added again, and the seed."""
+DRAWS = 2000
+"""Number of Monte Carlo draws of errors."""
 
 AGAIN = 1.0 / (sqrt(2.0) - 1.0)
 """Excess of the largest of equal values with errors, relative to the further excess if errors of the same size are
@@ -34,8 +34,9 @@ LEFT = (AGAIN - 1.0) / sqrt(3.0)
 the excess of equal values is left.
 """
 
-_RAISED, _DRAWS, _SEED, _HALVINGS = 0.5, 2000, 20, 30
-"""Settings of `largest_of`: see there, Monte Carlo draws, seed, and steps of the bisection."""
+_SEED = 20
+_RAISED, _HALVINGS = 0.5, 30
+"""Settings of `largest_of`: see there, and steps of the bisection."""
 
 
 def selection_bias(values: Array, covariance: Array) -> float:
@@ -47,7 +48,7 @@ def selection_bias(values: Array, covariance: Array) -> float:
         return 0.0
     # with errors that several values have in common, the matrix may be singular
     variances, directions = np.linalg.eigh(covariance[np.ix_(near, near)])
-    normal = np.random.default_rng(SEED).standard_normal((DRAWS, variances.size))
+    normal = np.random.default_rng(_SEED).standard_normal((DRAWS, variances.size))
     errors = normal @ (directions * np.sqrt(np.maximum(variances, 0.0))).T
     return max(float((values[near] + errors).max(axis=1).mean() - values.max()), 0.0)
 
@@ -76,7 +77,7 @@ def largest_of(maxima: Array) -> tuple[float, float]:
     top, widest = float(values.max()), float(spreads.max())
     if values.size == 1:
         return top, widest
-    noise = spreads * np.random.default_rng(_SEED).standard_normal((_DRAWS, values.size))
+    noise = spreads * np.random.default_rng(_SEED).standard_normal((DRAWS, values.size))
     low, high = top - RIVALS * widest, top
     mu = top
     for _ in range(_HALVINGS):

@@ -11,7 +11,8 @@ Where cycles are missing, no period spans the gap.
 
 The largest of several peaks with errors is too large on average, the smallest too small; both are corrected for it
 (`bench.analysis.selection`). The errors that differ between peaks are noise, the steps of the lasers and the delays due
-to their clocks. So is the largest sample of one peak, less the more the peak is curved.
+to their clocks. The largest sample of one peak is too large as well, less the more the peak is curved. Noise is that of
+the residual, which contains the steps of lasers that are not read through a filter.
 """
 
 from collections.abc import Sequence
@@ -26,10 +27,10 @@ from numpy.typing import NDArray
 from bench.analysis.cycles import SHARE, Cycle, mean_amplitude, mean_waves, parabola
 from bench.analysis.gain import SteadyPeak
 from bench.analysis.peak_readings import PeakReadings
-from bench.analysis.rounding import SmoothedPeaks
 from bench.analysis.selection import LEFT, larger_side, selection_bias
 from bench.analysis.sensor_accuracy import SensorAccuracy
 from bench.analysis.signals import ACCELERATION, DRIFT, U1
+from bench.analysis.smoothed_peaks import SmoothedPeaks
 from sim.attractor import largest_within
 
 Array = NDArray[np.float64]
@@ -52,7 +53,7 @@ class UnsteadyPeaks:
 
 def unsteady_peaks(cycles: Sequence[Cycle], omega: float, accuracy: SensorAccuracy) -> UnsteadyPeaks:
     """Peaks of consecutive cycles at `omega` [rad/s], relative to the storeys at rest."""
-    windows = [_Windows.of(each) for each in uninterrupted(cycles)]
+    windows = _windows(cycles)
     least = min(windows, key=lambda each: each.largest.min())
     greatest = max(windows, key=lambda each: each.largest.max())
     noise, excess = max(each.noise for each in windows), max(each.excess for each in windows)
@@ -75,15 +76,14 @@ def unsteady_peaks(cycles: Sequence[Cycle], omega: float, accuracy: SensorAccura
     tops = np.abs(seen.drift)
     sides = np.concatenate([each.sides for each in windows])
     one = sqrt(float(shares @ np.diag(errors)))
+    mean = float(np.concatenate([each.largest for each in windows]).mean())
     too_small, too_large = selection_bias(-tops, errors), selection_bias(tops, errors)
+    # errors may be smaller than assumed
+    corrected = min(smallest + too_small, mean), max(vertex - too_large, mean)
     return UnsteadyPeaks(
-        least=of(smallest + too_small, at_least, hypot(noise, LEFT * too_small, excess)),
-        mean=of(
-            float(np.concatenate([each.largest for each in windows]).mean()),
-            seen.mean(shares, omega),
-            hypot(noise / sqrt(len(cycles)), larger_side(sides, one), excess),
-        ),
-        greatest=of(vertex - too_large, at_greatest, hypot(noise, LEFT * too_large)),
+        least=of(corrected[0], at_least, hypot(noise, LEFT * too_small, excess)),
+        mean=of(mean, seen.mean(shares, omega), hypot(noise / sqrt(len(cycles)), larger_side(sides, one), excess)),
+        greatest=of(corrected[1], at_greatest, hypot(noise, LEFT * too_large)),
         used=tuple(cycles),
     )
 
@@ -155,9 +155,8 @@ class _Windows:
     largest: Array
 
     @classmethod
-    def of(cls, cycles: Sequence[Cycle]) -> "_Windows":
-        traces = np.concatenate([cycle.traces for cycle in cycles]).astype(np.float64)
-        length = round(len(traces) / len(cycles))
+    def of(cls, traces: Array, length: int) -> "_Windows":
+        """The windows within `traces`, shape (n, 3) [m]."""
         smooth, noise, slope = _smoothed(traces, _half(length))
         return cls(smooth, noise, slope, length, largest_within(np.abs(smooth[:, 0]), length))
 
@@ -207,6 +206,17 @@ class _Windows:
         rates = (lasers[end] - lasers[first]) * (self.length / (tau * (end - first)))[:, None]
         rows = np.clip(tops, step, last - step)[:, None] + np.arange(-step, step + 1)
         return _Seen(drift, lasers[tops], rates, lasers[rows].transpose(0, 2, 1), parabola(2 * step + 1)[0])
+
+
+def _windows(cycles: Sequence[Cycle]) -> list[_Windows]:
+    """Windows of every stretch of `cycles` without a missing cycle that is as long as a period."""
+    stretches = [
+        np.concatenate([cycle.traces for cycle in stretch]).astype(np.float64) for stretch in uninterrupted(cycles)
+    ]
+    # single cycles may have one sample less than the period
+    longest = max(len(each) for each in stretches)
+    length = min(round(sum(len(each) for each in stretches) / len(cycles)), longest)
+    return [_Windows.of(each, length) for each in stretches if len(each) >= length]
 
 
 def _half(length: int) -> int:
