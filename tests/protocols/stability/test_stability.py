@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from bench.analysis.uncertainty import decimals
 from bench.app.catalogue import load_protocol
 from bench.app.cli.main import main
 from bench.app.reports.report import campaign_report
@@ -86,7 +87,8 @@ def test_report_and_replay(unstable: dict[str, Any], folder: Path, capsys: pytes
         texts = list(document_texts(document))
     assert not faults(texts)
     assert any("Stability of the rocking orbits" in text for _, text in texts)
-    assert any(f"{unstable['modulus']:.3f}" in text for _, text in texts)
+    modulus = f"{unstable['modulus']:.{decimals(unstable['modulus_uncertainty'])}f}"
+    assert any(modulus in text for _, text in texts)
     assert any("closest at 1 of 1 points" in text for _, text in texts)
 
 
