@@ -53,7 +53,8 @@ class SmoothedPeaks:
     def _errors(self, step: float) -> NDArray[np.complex128]:
         """Complex rms amplitudes [m] of the terms of the sawtooth in each share, shape (TERMS, 2, peaks)."""
         turns = np.exp(2j * pi / step * self.readings)
-        terms = np.arange(1, TERMS + 1)
-        powers = np.cumprod(np.broadcast_to(turns, (TERMS, *turns.shape)), axis=0)
-        sizes = (step / (sqrt(2.0) * pi)) * self.shares / terms[:, None, None]
-        return np.asarray((powers @ self.weights) * sizes, dtype=np.complex128)
+        power, found = np.ones_like(turns), np.empty((TERMS, 2, self.shares.size), dtype=np.complex128)
+        for term in range(TERMS):
+            power *= turns
+            found[term] = power @ self.weights / (term + 1.0)
+        return step / (sqrt(2.0) * pi) * self.shares * found
