@@ -6,6 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.analysis.cycles import TRACES, Cycle
+from bench.analysis.sensor_accuracy import SensorAccuracy
+
+WITHOUT_STEPS = SensorAccuracy(laser_resolution=0.0, laser_timing=0.0)
+"""Accuracy of lasers that neither round nor are late."""
 
 
 @cache

@@ -68,7 +68,8 @@ def unsteady_peaks(cycles: Sequence[Cycle], omega: float, accuracy: SensorAccura
     at_least = least.seen(least.top_within(int(least.largest.argmin()))).mean(np.ones(1), omega)
     at_greatest = greatest.seen(greatest.top_within(int(greatest.largest.argmax()))).mean(np.ones(1), omega)
     seen = _Seen.joined([each.seen(each.tops[0]) for each in windows])
-    shares = np.concatenate([each.tops[1] for each in windows]) / sum(each.tops[1].sum() for each in windows)
+    positions = np.concatenate([each.tops[1] for each in windows])
+    shares = positions / positions.sum()
     smallest = float(least.largest.min())
     # the vertex of a parabola, not the largest sample
     vertex = max(float(cycle.extreme[DRIFT]) for cycle in cycles)

@@ -17,6 +17,9 @@ from sim.knowledge import SpecimenKnowledge
 from sim.shaker import Shaker
 from sim.specimen import Specimen
 
+ROCKING = "rocking"
+"""Name of the branch on which the block rocks."""
+
 AMPLITUDE_STEP = 0.002
 """Relative change of the amplitude in the finite difference for the sensitivity."""
 

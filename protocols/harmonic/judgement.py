@@ -7,9 +7,9 @@ from bench.analysis.free_motion import FreeMotion, Rate
 from bench.analysis.steady_correction import without_errors
 from bench.analysis.unsteady_correction import revealed
 from protocols.common.sine.settling import Held, Settled
-from protocols.harmonic.conditions import Conditions
+from protocols.harmonic.conditions import ROCKING, Conditions
 from protocols.harmonic.protocol import HarmonicPoint, PointStatus
-from protocols.harmonic.remarks import DIFFERS, ROCKING, amplitude_remark, remarks_on
+from protocols.harmonic.remarks import DIFFERS, amplitude_remark, remarks_on
 from sim.gain import Branch, nearest_branch
 from sim.shaker import Shaker
 from sim.steady import NoOrbit

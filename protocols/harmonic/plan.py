@@ -45,7 +45,7 @@ from protocols.common.sine.settling import (
     settle_and_measure,
 )
 from protocols.harmonic.approach import far, stable_above, with_pause
-from protocols.harmonic.conditions import Conditions, predicted_fields
+from protocols.harmonic.conditions import ROCKING, Conditions, predicted_fields
 from protocols.harmonic.free_prediction import with_free_prediction
 from protocols.harmonic.judgement import judge
 from protocols.harmonic.protocol import HarmonicParameters, HarmonicPoint, PointStatus
@@ -194,7 +194,7 @@ class HarmonicPlan:
             omega_rad_s=omega,
             beta=specimen.label or 0.0,
             status=PointStatus.OVERTURNED,
-            **predicted_fields("rocking", branch, self._configuration.known_on_table),
+            **predicted_fields(ROCKING, branch, self._configuration.known_on_table),
             bare_drift_peak_m=bare.drift,
             bare_amplitude_m_s2=bare.amplitude,
             starts_tried=falls,

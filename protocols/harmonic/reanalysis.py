@@ -31,7 +31,7 @@ from protocols.common.sine.settling import (
     linear_frame,
     preceding,
 )
-from protocols.harmonic.conditions import Conditions, predicted_fields
+from protocols.harmonic.conditions import ROCKING, Conditions, predicted_fields
 from protocols.harmonic.free_prediction import with_free_prediction
 from protocols.harmonic.judgement import judge
 from protocols.harmonic.protocol import HarmonicParameters, HarmonicPoint, HarmonicSettings, PointStatus
@@ -167,7 +167,7 @@ class HarmonicFollower:
         if point.status is PointStatus.OVERTURNED:
             asked = self._amplitude
             branch = predict_gain(specimen, omega, asked, bare.peak.amplitude).rocking
-            predicted = predicted_fields("rocking", branch, self._configuration.known_on_table)
+            predicted = predicted_fields(ROCKING, branch, self._configuration.known_on_table)
             peaks = {"bare_drift_peak_m": bare.peak.drift, "bare_amplitude_m_s2": bare.peak.amplitude}
             return point.model_copy(update=predicted | peaks)
         sensors = checked(self._configuration.sensors, self._bare.values())

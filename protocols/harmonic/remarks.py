@@ -5,10 +5,8 @@ from typing import Any
 
 from bench.analysis.uncertainty import plus_minus
 from protocols.common.sine.settling import Held, Settled
+from protocols.harmonic.conditions import ROCKING
 from sim.gain import Branch
-
-ROCKING = "rocking"
-"""Name of the branch on which the block rocks."""
 
 AMPLITUDE_NOTE = 0.002
 """Relative error of the table's amplitude above which a remark is added; the prediction is always for the achieved

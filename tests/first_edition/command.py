@@ -63,7 +63,11 @@ OF_CALIBRATION = {
 }
 """Of a calibrated sensor: the cycles are fitted with 21 harmonics instead of 10, so that errors with short waves are
 found, and the order is the best one instead of the lowest that is hardly worse. The linearity error of the reference
-sensor is corrected. A value may differ by the uncertainty that the first edition stated, given for each."""
+sensor is corrected, which changes the largest error. A value may differ by a share of the uncertainty that the first
+edition stated, given for each."""
+
+OF_LARGEST, OF_OTHERS = 1.0, 0.5
+"""Shares of the stated uncertainty by which the largest error and the other values may differ."""
 
 OF_CALIBRATION_RATIOS = {"scale_uncertainty": 1.0, "delay_uncertainty_s": 1.5, "residual_m": 1.5, "order": 7.0}
 """Of a calibrated sensor: largest ratio to the value of the first edition. The uncertainty of a laser's scale was twice
@@ -185,7 +189,8 @@ def _otherwise_calibrated(old: Mapping[str, Any], new: Mapping[str, Any], where:
         if was is None:
             continue
         if key in OF_CALIBRATION:
-            allowed = abs(now - was) <= (old[OF_CALIBRATION[key]] or 0.0)
+            most = OF_LARGEST if key == "largest_error_m" else OF_OTHERS
+            allowed = abs(now - was) <= most * (old[OF_CALIBRATION[key]] or 0.0)
         else:
             allowed = key not in OF_CALIBRATION_RATIOS or 0.0 <= now <= OF_CALIBRATION_RATIOS[key] * was
         if not allowed:

@@ -9,19 +9,17 @@ from numpy.typing import NDArray
 
 from bench.analysis.cycles import Cycle, CycleAnalyser
 from bench.analysis.free_motion import CYCLES, free_motion, orbit_peak, rate_of
-from bench.analysis.sensor_accuracy import SensorAccuracy
 from bench.analysis.signals import DRIFT, LASER_1, LASER_2, U1
 from sim.excitation import SineProgram, Sweep
 from sim.gain import predict_gain
 from sim.rocking import simulate
 from sim.specimen import Specimen
-from tests.made_cycles import pure_cycle
+from tests.made_cycles import WITHOUT_STEPS, pure_cycle
 
 Array = NDArray[np.float64]
 RATE = 2000.0
 AMPLITUDE = 1.01 * Specimen().uplift_acceleration
 NOISE = 1e-6
-WITHOUT_STEPS = SensorAccuracy(laser_resolution=0.0, laser_timing=0.0)
 
 
 def cycles_after(beta: float, omega: float, wait: int) -> tuple[list[Cycle], Array]:

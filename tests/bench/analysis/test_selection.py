@@ -7,23 +7,25 @@ from bench.analysis.selection import LEFT, selection_bias
 
 
 @pytest.mark.parametrize(
-    ("distances", "within"),
+    ("distances", "within", "covered"),
     [
-        ([0.0, 30.0], 1.1),
-        ([0.0, 1.0, 2.0, 30.0], 1.1),
-        (np.arange(40) * 0.5, 1.1),
-        ([0.0, 0.0, 0.5, 30.0, 40.0], 1.2),
+        ([0.0, 30.0], 1.1, 0.94),
+        ([0.0, 1.0, 2.0, 30.0], 1.1, 0.94),
+        (np.arange(40) * 0.5, 1.1, 0.94),
+        ([0.0, 0.0, 0.5, 30.0, 40.0], 1.1, 0.94),
         # of equal values, at most the bias that equal values leave
-        ([0.0] * 9, 1.3),
+        ([0.0] * 9, 1.3, 0.88),
     ],
 )
-def test_the_largest_of_several_values_is_corrected_for_its_selection(distances: list[float], within: float) -> None:
+def test_the_largest_of_several_values_is_corrected_for_its_selection(
+    distances: list[float], within: float, covered: float
+) -> None:
     random, true = np.random.default_rng(1), -2.0 * np.array(distances)
     seen = true + 2.0 * random.standard_normal((600, true.size))
     added = np.array([selection_bias(each, np.diag(np.full(true.size, 4.0))) for each in seen])
     largest = seen.max(axis=1)
     stated = np.sqrt(4.0 + (LEFT * added) ** 2)
-    assert np.mean(np.abs(largest - added) < 2.0 * stated) > 0.88
+    assert np.mean(np.abs(largest - added) < 2.0 * stated) > covered
     assert 0.8 < np.sqrt(np.mean(((largest - added) / stated) ** 2)) < within
     # two thirds of what selection adds to equal values are left
     assert -0.2 < np.mean(largest - added) < 0.7 * np.mean(largest) + 0.2

@@ -20,6 +20,7 @@ from bench.analysis.unsteady_peaks import (
     _smoothed,  # pyright: ignore[reportPrivateUsage]
     unsteady_peaks,
 )
+from tests.made_cycles import WITHOUT_STEPS
 
 Array = NDArray[np.float64]
 
@@ -27,7 +28,6 @@ SAMPLES, CYCLES, STEP = 840, 48, 5e-5
 PHASE = np.arange(SAMPLES) * (2.0 * np.pi / SAMPLES)
 AMPLITUDE, OFFSET = 0.02, 0.1
 PEAK = AMPLITUDE * (1.0 + OFFSET)
-WITHOUT_STEPS = SensorAccuracy(laser_resolution=0.0, laser_timing=0.0)
 
 
 def noisy(noise: float, seed: int) -> Cycle:
@@ -77,8 +77,8 @@ def test_the_noise_of_the_smallest_and_the_largest_of_many_peaks_is_stated(offse
     # 20 values of honest numbers have an rms below 1.4 with a probability of 99 %
     rms = np.sqrt(np.mean(np.square(errors), axis=0))
     assert (rms < 1.4).all()
-    # of two sides, the larger one is too large: the smallest of several is less too small than it is corrected for
-    assert (rms > (0.3, 0.4, 0.6)).all()
+    # of two equal sides, the larger one is too large: the smallest of several is less too small than is corrected for
+    assert (rms > (0.4 if offset or rise else 0.3, 0.4, 0.6)).all()
 
 
 def beating(seed: int, changes: float) -> Array:
